@@ -25,7 +25,9 @@ from truenorth.state.mounting import Mounting
 ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
 BASELINE = math.radians(1.0)  # of a second antenna said to be ahead of the first
 LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
-ANTENNA = Mounting(angle_sigma=BASELINE, latency_sigma=LATENCY_SIGMA)  # of which nothing is said
+ANTENNA = Mounting(  # of which nothing is said
+    lever_arm_sigma=1.0, angle_sigma=BASELINE, latency_sigma=LATENCY_SIGMA
+)
 WHEEL = Mounting(  # of which nothing is said; a vehicle's bus takes some .01 s
     scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0, latency_sigma=0.05
 )
@@ -74,8 +76,8 @@ class Gnss(_Mounted):
     ----------
     record : GnssRecord
     mounting : Mounting, optional
-        Of the antenna; a second one is on the forward axis of ``C_mb``, to `angle_sigma` (1 deg when left out). Left out, the
-        receiver's latency is estimated (.2 s, one sigma).
+        Of the antenna; a second one is on the forward axis of ``C_mb``, to `angle_sigma` (1 deg when left out). Left out, arm
+        (1 m) and latency (.2 s) are estimated.
     """
 
     record: GnssRecord

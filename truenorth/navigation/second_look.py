@@ -81,9 +81,10 @@ def second_look(
             continue
         for role in roles:
             where = track.layout.slice_of(f"{name} {role}")
-            if where is None or getattr(given, OPEN[role].sigma) > 0.0:
+            said = getattr(given, OPEN[role].sigma)
+            if where is None or (said > 0.0 and role != "lever arm"):
                 continue
-            value, sigma = track.sensors[-1, where], track.sigma[-1, where]
+            value, sigma = track.sensors[-1, where], np.hypot(track.sigma[-1, where], said)
             size = np.where(np.abs(value) > OPEN[role].least, np.abs(value) / sigma, 0.0)
             if np.any(size > limit("misfit")):
                 item = _contradiction(role, name, key, given, value, sigma)
