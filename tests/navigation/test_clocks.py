@@ -101,7 +101,7 @@ def test_a_delay_that_an_alignment_has_found_is_taken_over(drive):
     result = navigate(record, found, aid=Gnss(gnss), imu=SPEC)
     assert "gnss.delay_taken_over" in {item.key for item in result.evidence}
     assert not any(item.key.startswith("second_look") for item in result.evidence)
-    plain = navigate(record, start, aid=Gnss(gnss), imu=SPEC)
+    plain = navigate(record, start, aid=Gnss(gnss, Mounting()), imu=SPEC)
     assert "second_look.late" in {item.key for item in plain.evidence}
     lag = result.track.layout.slice_of("GNSS lag").start
     left, sigma = result.track.sensors[-1, lag], result.track.sigma[-1, lag]

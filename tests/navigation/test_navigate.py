@@ -99,7 +99,7 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
     motion, record, start = drive
     time = np.arange(1.0, 179.0)
     late = fixes(motion, time, sigma=0.3).shifted(0.3)
-    found = navigate(record, start, aid=Gnss(late), imu=SPEC)
+    found = navigate(record, start, aid=Gnss(late, Mounting()), imu=SPEC)
     words = [reason for reason in found.reasons if reason.startswith("warning: the clock")]
     assert len(words) == 1
     assert "late" in words[0]
@@ -117,7 +117,7 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
 def test_a_wrong_lever_arm_is_said(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.1, arm=(1.5, 2.5, 1.0))
-    wrong = navigate(record, start, aid=Gnss(gnss), imu=SPEC)
+    wrong = navigate(record, start, aid=Gnss(gnss, Mounting()), imu=SPEC)
     assert any("lever arm of the GNSS seems to be right +1.5" in reason for reason in wrong.reasons)
     right = navigate(record, start, aid=Gnss(gnss, Mounting(lever_arm=np.array([1.5, 2.5, 1.0]))), imu=SPEC)
     assert not any("lever arm" in reason for reason in right.reasons)

@@ -51,7 +51,7 @@ def mountings_found(begin: Start) -> dict[str, Mounting]:
 
 
 def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
-    """What of an alignment on the move holds for the aids, which are mounted so where nothing else is said."""
+    """What of an alignment on the move holds for the aids, which are mounted so where nothing else is said, or else as is usual."""
     said = []
     for key, found in mountings_found(begin).items():
         if not isinstance(aid := given.get(key), Odometer | Gnss):
@@ -60,13 +60,10 @@ def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
             aid = given[key] = aid.mounted(found)
         if _says_the_same(key, aid.mounting or found, found):
             said.append(note("odometer.taken_over" if key == Odometer.key else "gnss.delay_taken_over"))
+    for key, aid in given.items():
+        if isinstance(aid, AIDS) and key in USUAL and aid.mounting is None:
+            given[key] = aid.mounted(USUAL[key])
     return said
-
-
-def mounted_as_usual(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The aids, those of whose mounting nothing is said and nothing was found as is usual of them."""
-    unsaid = {key for key, a in given.items() if key in USUAL and isinstance(a, AIDS) and a.mounting is None}
-    return {key: a.mounted(USUAL[key]) if key in unsaid else a for key, a in given.items()}
 
 
 def _says_the_same(key: str, given: Mounting, found: Mounting) -> bool:

@@ -31,7 +31,6 @@ from truenorth.navigation.given import (
     kind_of_log,
     looked_at,
     mounted_as,
-    mounted_as_usual,
     record_of,
     taken_over,
 )
@@ -151,7 +150,6 @@ def navigate(
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     taken = taken_over(given, begin) + kind_of_log(given)
-    given = mounted_as_usual(given)
     height, why = kept_altitude(altitude, given)
     groups = groups_of((*errors, *deflection.groups), noise)
     model = _model(begin, noise, groups, scale_factors, height)

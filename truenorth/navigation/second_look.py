@@ -89,7 +89,7 @@ def second_look(
             if np.any(size > limit("misfit")):
                 item = _contradiction(role, name, key, given, value, sigma)
                 against.append(replace(item, urgent=bool(np.any(size > limit("clear misfit")))))
-            elif role == "lever arm" and np.linalg.norm(given.lever_arm) > LONG_ARM:
+            elif role == "lever arm" and said == 0.0 and np.linalg.norm(given.lever_arm) > LONG_ARM:
                 arm = given.lever_arm
                 length = float(np.linalg.norm(arm))
                 if math.sqrt(arm**2 @ sigma**2 / (arm @ arm)) > KNOWN_ARM * length:
