@@ -161,6 +161,8 @@ class _Sources:
 
     def of(self, value: Any, names: set[str]) -> str:
         """A value that a function names; `names` are those that it may ask a module for."""
+        if isinstance(value, KernelSource):  # most of them
+            return f"compiled({self.see(value.py_func)}, {_of_options(value.options)})"
         if isinstance(value, Enum):
             return f"{self._of_class(type(value), names)}.{value.name}"
         if value is None or isinstance(value, (bool, int, float, complex, str, bytes)):
@@ -172,8 +174,6 @@ class _Sources:
         if isinstance(value, (np.ndarray, np.generic)):
             array = np.asarray(value)
             return f"array({array.dtype!r}, {array.shape}, {array.flags.c_contiguous}, {array.tobytes()!r})"
-        if isinstance(value, KernelSource):
-            return f"compiled({self.see(value.py_func)}, {_of_options(value.options)})"
         if isinstance(value, (Pointer, VectorStep)):
             return self.of(value.intrinsic, names) if self.by_numba else self._of_step(value)
         if isinstance(value, CodeType):

@@ -28,22 +28,18 @@ T = TypeVar("T")
 
 UNUSABLE = (CannotLinkError, ImportError, AttributeError)  # the last two: a version of Numba with other names
 SUFFIX = ".code"
-IN_ORDER, BY_COLUMNS, REST = 0x1, 0x2, 0x501  # NumPy's flags: C, F, and C with aligned and writeable
+IN_ORDER, BY_COLUMNS, FLAGS = 0x1, 0x2, 0x503  # of NumPy: C, F, and both with aligned and writeable
+LAYOUTS = [flags & ~BY_COLUMNS if flags & IN_ORDER else flags for flags in range(FLAGS + 1)]
 
 
 def kind_of(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
     """What machine code depends on of arguments; quick, and of this process."""
-    kinds: list[Any] = []
-    for argument in arguments:
-        kind = type(argument)
-        if kind is np.ndarray:
-            flags = argument.flags.num
-            kinds.append((argument.dtype, argument.ndim, flags & (REST if flags & IN_ORDER else REST | BY_COLUMNS)))
-        elif isinstance(argument, tuple):
-            kinds.append((kind, kind_of(argument)))
-        else:
-            kinds.append(kind)
-    return tuple(kinds)
+    return tuple([
+        (a.dtype, a.ndim, LAYOUTS[a.flags.num & FLAGS]) if type(a) is np.ndarray
+        else (type(a), kind_of(a)) if isinstance(a, tuple)
+        else type(a)
+        for a in arguments
+    ])  # fmt: skip
 
 
 def name_of(function: Callable[..., Any], options: dict[str, Any], arguments: tuple[Any, ...]) -> str | None:
