@@ -99,6 +99,7 @@ def test_a_second_process_gives_the_same_bits_and_errors_without_numba(tmp_path)
     where = first.index("True")
     assert second[where] == "False"
     assert by_numba[where] == "True"
+    assert said(tmp_path, NUMBA_NUM_THREADS="1")[where] == "False"  # as workers of campaigns have it
     for lines in (first, second, by_numba):
         del lines[where]
     assert first == second == by_numba

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeVar
 
+from truenorth.core import ready
 from truenorth.core.kernel_source import KernelSource
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -23,7 +24,7 @@ class Found(NamedTuple):
 
 
 class Kernel(KernelSource):
-    """A compiled function; Numba itself is loaded when it is first called.
+    """A compiled function: called by its machine code where that is on the disk, else by Numba, which is loaded then.
 
     Other kernels call the function without the code that unpacks Python's arguments, a third of the time that
     compilation takes; that code is made only for what Python calls.
@@ -39,16 +40,12 @@ class Kernel(KernelSource):
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function."""
-        from truenorth.core.ready import kind_of
-
-        kind = kind_of(arguments)
+        kind = ready.kind_of(arguments)
         call = self._ready.get(kind)
         return self._first(kind, arguments) if call is None else call(*arguments)
 
     def _first(self, kind: Any, arguments: tuple[Any, ...]) -> Any:
         """Call with arguments of a kind that was not there yet in this process: by machine code from the disk, else by Numba."""
-        from truenorth.core import ready
-
         name, use = self._file(arguments), partial(ready.function_of, self.py_func)
         call = ready.found(name, use)
         if call is not None:
@@ -64,9 +61,7 @@ class Kernel(KernelSource):
 
     def _file(self, arguments: tuple[Any, ...]) -> str | None:
         """The name of the file of machine code; none for calls that leave out arguments."""
-        from truenorth.core.ready import name_of
-
-        return name_of(self.py_func, self.options, arguments) if len(arguments) == self._count else None
+        return ready.name_of(self.py_func, self.options, arguments) if len(arguments) == self._count else None
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -101,8 +96,6 @@ class Kernel(KernelSource):
 
     def is_there(self, *arguments: Any) -> bool:
         """Whether a call with such arguments compiles nothing."""
-        from truenorth.core import ready
-
         if ready.kind_of(arguments) in self._ready:
             return True
         if ready.is_there(self._file(arguments)):
@@ -125,10 +118,10 @@ class Kernel(KernelSource):
     def stats(self) -> Found:
         """What was found on the disk, and what was compiled."""
         by_numba = vars(self).get("dispatcher")
-        ready = {kind: 1 for kind, call in self._ready.items() if call is not by_numba}
+        by_itself = {kind: 1 for kind, call in self._ready.items() if call is not by_numba}
         if by_numba is None:
-            return Found(ready, {})
-        return Found(ready | by_numba.stats.cache_hits, by_numba.stats.cache_misses)
+            return Found(by_itself, {})
+        return Found(by_itself | by_numba.stats.cache_hits, by_numba.stats.cache_misses)
 
     @property
     def signatures(self) -> Any:
@@ -208,8 +201,6 @@ class Callback(KernelSource):
     @cached_property
     def address(self) -> int:
         """Where the compiled function stands in this process; this object must live on."""
-        from truenorth.core import ready
-
         name = ready.name_of(self.py_func, self.options | {"callback": self.signature}, ())
         use = partial(ready.callback_of, self.py_func)
         found = ready.found(name, use)

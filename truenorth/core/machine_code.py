@@ -17,7 +17,7 @@ import builtins
 import ctypes
 import math
 import mmap
-import platform
+import os
 import struct
 import sys
 from functools import cache
@@ -61,7 +61,7 @@ class _Symbol(NamedTuple):
 
 def can_link() -> bool:
     """Whether this computer's object files are of the kind that is understood here."""
-    return sys.platform == "linux" and platform.machine() == "x86_64" and sys.implementation.name == "cpython"
+    return sys.platform == "linux" and os.uname().machine == "x86_64" and sys.implementation.name == "cpython"
 
 
 class MachineCode:

@@ -27,6 +27,7 @@ from truenorth.core.numba_part import numba_part
 T = TypeVar("T")
 
 UNUSABLE = (CannotLinkError, ImportError, AttributeError)  # the last two: a version of Numba with other names
+HARMLESS = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER"}  # settings that code does not depend on
 SUFFIX = ".code"
 IN_ORDER, BY_COLUMNS, FLAGS = 0x1, 0x2, 0x503  # of NumPy: C, F, and both with aligned and writeable
 LAYOUTS = [flags & ~BY_COLUMNS if flags & IN_ORDER else flags for flags in range(FLAGS + 1)]
@@ -111,5 +112,5 @@ def callback_of(function: Callable[..., Any], content: bytes) -> tuple[int, obje
 @cache
 def _is_plain() -> bool:
     """Whether Numba has its usual settings, on a system whose machine code is understood."""
-    set_otherwise = any(name.startswith("NUMBA_") and name != "NUMBA_CACHE_DIR" for name in os.environ)
+    set_otherwise = any(name.startswith("NUMBA_") and name not in HARMLESS for name in os.environ)
     return can_link() and not set_otherwise and not os.path.exists(".numba_config.yaml")
