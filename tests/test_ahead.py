@@ -10,7 +10,7 @@ from truenorth.alignment.bias_step import _follow
 from truenorth.alignment.matched import _sum_back
 from truenorth.alignment.motion_likelihood import _folded_autocovariances
 from truenorth.cli import ahead
-from truenorth.core import kernel_store
+from truenorth.core import kernel_folder
 from truenorth.core.kernel_lock import KernelLock
 from truenorth.core.position import Position
 from truenorth.errors.sway import fill_blocks
@@ -54,7 +54,7 @@ def kinds(kernel):
 
 def test_it_starts_where_the_kernels_are_not_on_the_disk(tmp_path, monkeypatch):
     started = []
-    monkeypatch.setattr(kernel_store, "write_folder", lambda: tmp_path)
+    monkeypatch.setattr(kernel_folder, "write_folder", lambda: tmp_path)
     monkeypatch.setattr(ahead.os, "cpu_count", lambda: 2)
     monkeypatch.setattr(ahead.subprocess, "Popen", lambda command, **options: started.append(command))
     ahead.compile_ahead()
@@ -71,7 +71,7 @@ def test_it_starts_where_the_kernels_are_not_on_the_disk(tmp_path, monkeypatch):
 
 def test_it_ends_behind_the_kernel_in_which_the_first_process_ends(tmp_path, monkeypatch):
     done = []
-    monkeypatch.setattr(kernel_store, "write_folder", lambda: tmp_path)
+    monkeypatch.setattr(kernel_folder, "write_folder", lambda: tmp_path)
     monkeypatch.setattr(ahead, "_wait_for_end", lambda end: done.append(end))
 
     def job():

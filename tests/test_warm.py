@@ -10,7 +10,7 @@ from truenorth import papers
 from truenorth.aiding.magnetometer import FIELD
 from truenorth.cli import warm as commands
 from truenorth.cli.warm import STUDIES, TASKS, run_task, warm
-from truenorth.core import kernel_store
+from truenorth.core import kernel_folder
 from truenorth.simulation.scenario import shipped
 from truenorth.strapdown.level import mechanise_increments
 
@@ -20,7 +20,7 @@ def test_each_task_is_a_scenario_that_ships():
 
 
 def test_what_is_done_is_not_done_again(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(kernel_store, "write_folder", lambda: tmp_path)
+    monkeypatch.setattr(kernel_folder, "write_folder", lambda: tmp_path)
     ran = []
     monkeypatch.setattr(commands, "_show", lambda pool, tasks: ran.append(tasks))
     warm(workers=1)
@@ -30,7 +30,7 @@ def test_what_is_done_is_not_done_again(tmp_path, monkeypatch, capsys):
 
 
 def test_studies_are_compiled_where_they_are_asked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(kernel_store, "write_folder", lambda: tmp_path)
+    monkeypatch.setattr(kernel_folder, "write_folder", lambda: tmp_path)
     ran = []
     monkeypatch.setattr(commands, "_show", lambda pool, tasks: ran.append(tasks))
     warm(workers=1)
@@ -47,15 +47,15 @@ def test_what_no_scenario_asks_for(tmp_path, monkeypatch):
         truenorth.ImuRecord(0.01 * np.arange(1, 201), np.zeros((200, 3)), np.tile([0.0, 0.0, 9.8], (200, 1))),
         "imu.parquet",
     )
-    FIELD.function.__dict__.pop("compiled", None)
-    monkeypatch.delitem(mechanise_increments.__dict__, "dispatcher", raising=False)
+    FIELD.function.__dict__.pop("address", None)
+    monkeypatch.setattr(mechanise_increments, "_ready", {})
     commands._beyond_commands()
-    assert "compiled" in FIELD.function.__dict__
+    assert "address" in FIELD.function.__dict__
     assert len(mechanise_increments.signatures) == 1
 
 
 def test_without_a_folder_it_says_so(monkeypatch, capsys):
-    monkeypatch.setattr(kernel_store, "write_folder", lambda: None)
+    monkeypatch.setattr(kernel_folder, "write_folder", lambda: None)
     warm()
     assert "no cache folder can be written to" in capsys.readouterr().err
 

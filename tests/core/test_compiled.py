@@ -13,8 +13,8 @@ import pytest
 
 import truenorth
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
+from truenorth.core.kernel_folder import prune
 from truenorth.core.kernel_source import KernelSource
-from truenorth.core.kernel_store import prune
 
 MODULES = {
     "plugin_constants": "RATE = 2.0\nUNUSED = 5.0\n",
@@ -196,8 +196,8 @@ def test_without_a_folder_to_write_to_a_process_compiles_for_itself(tmp_path):
 def test_a_torn_file_is_compiled_anew(tmp_path):
     folder = write(tmp_path / "one")
     run(CALL.format(folder=str(folder)), tmp_path)
-    (kernel,) = (tmp_path / "truenorth" / "kernels").glob("plugin_outer.outer-*")
-    kernel.write_bytes(kernel.read_bytes()[:-100])
+    for kernel in (tmp_path / "truenorth" / "kernels").glob("plugin_outer.outer-*"):
+        kernel.write_bytes(kernel.read_bytes()[:-100])
     assert run(CALL.format(folder=str(folder)), tmp_path) == ["4.0 3.0", "1 0", "0 1"]
     assert run(CALL.format(folder=str(folder)), tmp_path) == ["4.0 3.0", "0 1", "0 1"]
 
@@ -285,7 +285,7 @@ def test_processes_that_compile_at_once_leave_each_signature_its_own_code(tmp_pa
     started = [start(kind) for kind in ("int", "float", "complex", "int")]
     assert [process.communicate()[0].strip() for process in started] == ["6", "3.0", "2j", "6"]
     assert start("int", "float", "complex").communicate()[0].split() == ["6", "3.0", "2j"]
-    assert len(list((tmp_path / "truenorth" / "kernels").iterdir())) == 3
+    assert len(list((tmp_path / "truenorth" / "kernels").glob("*.kernel"))) == 3
 
 
 def test_what_was_unused_longest_goes_first(tmp_path):

@@ -126,14 +126,13 @@ def opened(folder: str | os.PathLike[str], plan: Plan, *, resume: bool = True) -
 
 def versions() -> dict[str, str]:
     """What the numbers come from besides the plan: with all of it alike they are the same to the bit."""
-    import numba
-    import scipy
+    from importlib.metadata import version
 
     return {
         "truenorth": __version__,
         "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
+        "scipy": version("scipy"),
+        "numba": version("numba"),
         "platform": f"{platform.system()} {platform.machine()}",
     }
 

@@ -29,8 +29,8 @@ def compile_ahead() -> None:
     It ends with this process, but for the kernel that it is at: it reads a pipe that nobody writes to. A process that has been
     started by another of its kind starts none: `truenorth warm` has one for each processor as it is.
     """
+    from truenorth.core.kernel_folder import write_folder
     from truenorth.core.kernel_lock import KernelLock
-    from truenorth.core.kernel_store import write_folder
 
     if "multiprocessing" in sys.modules and sys.modules["multiprocessing"].parent_process() is not None:
         return
@@ -49,8 +49,8 @@ _running: list[subprocess.Popen[bytes]] = []  # held: the pipe would be closed w
 
 def compile_last() -> None:
     """What runs in the second process; ends it behind the kernel in which the first one ends."""
+    from truenorth.core.kernel_folder import write_folder
     from truenorth.core.kernel_lock import KernelLock
-    from truenorth.core.kernel_store import write_folder
 
     left_alone = threading.Event()
     threading.Thread(target=_wait_for_end, args=(left_alone,), daemon=True).start()

@@ -74,7 +74,7 @@ def warm(
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    from truenorth.core.kernel_store import write_folder
+    from truenorth.core.kernel_folder import write_folder
 
     folder = write_folder()
     if folder is None:

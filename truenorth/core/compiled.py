@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
-from typing import Any, TypeVar
+from functools import cached_property, partial
+from typing import Any, NamedTuple, TypeVar
 
+from truenorth.core import ready
 from truenorth.core.kernel_source import KernelSource
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -15,16 +16,52 @@ OPTIONS: dict[str, Any] = {"nopython": True, "error_model": "numpy", "fastmath":
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
+class Found(NamedTuple):
+    """How often kernels of each kind of arguments came from the disk, and how often they were compiled."""
+
+    cache_hits: dict[Any, int]
+    cache_misses: dict[Any, int]
+
+
 class Kernel(KernelSource):
-    """A compiled function; Numba itself is loaded when it is first called.
+    """A compiled function: called by its machine code where that is on the disk, else by Numba, which is loaded then.
 
     Other kernels call the function without the code that unpacks Python's arguments, a third of the time that
     compilation takes; that code is made only for what Python calls.
     """
 
+    def __init__(
+        self, function: Callable[..., Any], options: dict[str, Any], prepare: Callable[[], None] | None = None
+    ) -> None:
+        super().__init__(function, options)
+        self.prepare = prepare
+        self._count = function.__code__.co_argcount
+        self._ready: dict[Any, Callable[..., Any]] = {}  # what is called, by the kinds of the arguments
+
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function."""
-        return self.dispatcher(*arguments)
+        kind = ready.kind_of(arguments)
+        call = self._ready.get(kind)
+        return self._first(kind, arguments) if call is None else call(*arguments)
+
+    def _first(self, kind: Any, arguments: tuple[Any, ...]) -> Any:
+        """Call with arguments of a kind that was not there yet in this process: by machine code from the disk, else by Numba."""
+        name, use = self._file(arguments), partial(ready.function_of, self.py_func)
+        call = ready.found(name, use)
+        if call is not None:
+            self._ready[kind] = call
+            return call(*arguments)
+        result = self.dispatcher(*arguments)
+        self._ready[kind] = self.dispatcher
+        if name is not None:
+            from truenorth.core.kernel_store import machine_code_of
+
+            ready.keep(name, machine_code_of(self.dispatcher.overloads[self._types(arguments)]), use)
+        return result
+
+    def _file(self, arguments: tuple[Any, ...]) -> str | None:
+        """The name of the file of machine code; none for calls that leave out arguments."""
+        return ready.name_of(self.py_func, self.options, arguments) if len(arguments) == self._count else None
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -50,6 +87,8 @@ class Kernel(KernelSource):
 
         from truenorth.core.kernel_store import KernelStore
 
+        if self.prepare is not None:
+            self.prepare()
         dispatcher: Any = numba.jit(pipeline_class=compiler, **options)(self.py_func)
         dispatcher._cache = KernelStore(self.py_func, options | compiler.kept_as)
         dispatcher.compile = dispatcher._cache.guarded(dispatcher.compile)
@@ -57,6 +96,10 @@ class Kernel(KernelSource):
 
     def is_there(self, *arguments: Any) -> bool:
         """Whether a call with such arguments compiles nothing."""
+        if ready.kind_of(arguments) in self._ready:
+            return True
+        if ready.is_there(self._file(arguments)):
+            return True
         types = self._types(arguments)
         return types in self.dispatcher.overloads or self.dispatcher._cache.is_there(types, self._codegen)
 
@@ -72,17 +115,21 @@ class Kernel(KernelSource):
         return self.dispatcher.targetctx.codegen()
 
     @property
-    def stats(self) -> Any:
-        """Numba's count of what was compiled and what was found on the disk."""
-        return self.dispatcher.stats
+    def stats(self) -> Found:
+        """What was found on the disk, and what was compiled."""
+        by_numba = vars(self).get("dispatcher")
+        by_itself = {kind: 1 for kind, call in self._ready.items() if call is not by_numba}
+        if by_numba is None:
+            return Found(by_itself, {})
+        return Found(by_itself | by_numba.stats.cache_hits, by_numba.stats.cache_misses)
 
     @property
     def signatures(self) -> Any:
-        """The types of arguments that it was called with."""
-        return self.dispatcher.signatures
+        """The kinds of arguments that it was called with."""
+        return list(self._ready)
 
 
-def compiled(function: F | None = None, **options: Any) -> Any:
+def compiled(function: F | None = None, *, prepare: Callable[[], None] | None = None, **options: Any) -> Any:
     """Compile a function with Numba where it is first called: IEEE arithmetic, NumPy division rules, cached on disk.
 
     A kernel on the disk is named by all that its code depends on (:mod:`~truenorth.core.fingerprint`), where Numba's
@@ -93,6 +140,8 @@ def compiled(function: F | None = None, **options: Any) -> Any:
     ----------
     function : callable
         The function; may be left out when options are given (``@compiled(forceinline=True)``).
+    prepare : callable, optional
+        What is done before Numba is given the function.
     **options
         Passed on to :func:`numba.jit`.
 
@@ -101,8 +150,8 @@ def compiled(function: F | None = None, **options: Any) -> Any:
     Kernel, or a decorator when `function` is left out.
     """
     if function is None:
-        return lambda f: compiled(f, **options)
-    return Kernel(function, OPTIONS | options)
+        return lambda f: compiled(f, prepare=prepare, **options)
+    return Kernel(function, OPTIONS | options, prepare)
 
 
 def borrowing(function: F | None = None, **options: Any) -> Any:
@@ -149,9 +198,19 @@ class Callback(KernelSource):
         callback.compile()
         return callback
 
-    @property
+    @cached_property
     def address(self) -> int:
         """Where the compiled function stands in this process; this object must live on."""
+        name = ready.name_of(self.py_func, self.options | {"callback": self.signature}, ())
+        use = partial(ready.callback_of, self.py_func)
+        found = ready.found(name, use)
+        if found is not None:
+            address, self._held = found
+            return address
+        if name is not None:
+            from truenorth.core.kernel_store import machine_code_of
+
+            ready.keep(name, machine_code_of(self.compiled._cache.kernel), use)
         return int(self.compiled.address)
 
 

@@ -4,37 +4,36 @@ Numba freezes into a kernel its own bytecode, the constants and the module-level
 compiled function it calls. The digest covers exactly these, through all calls: it changes where the machine code may
 change, and stays where only a comment, a docstring, a line number, another function or the folder changes. Equal
 sources thus share kernels across checkouts, and an edit compiles its dependents only.
+
+A second digest names the code that is called without Numba (:mod:`~truenorth.core.ready`): of the same sources, and of the
+arguments themselves in place of Numba's types of them. Neither loads Numba.
 """
 
 from __future__ import annotations
 
 import hashlib
 import inspect
+import os
 import sys
 from collections.abc import Callable
 from enum import Enum
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
-import llvmlite
-import numba
 import numpy as np
-from numba.core import types
-from numba.core.ccallback import CFunc
-from numba.core.dispatcher import Dispatcher
-from numba.core.extending import _Intrinsic
 
 from truenorth.core.kernel_source import STEPS, KernelSource
 from truenorth.core.pointers import Pointer
 from truenorth.core.vectors import VectorStep
 
+Remembered = type(cache(len))
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
-CONFIG: Any = numba.config
-TOOLS = repr((
-    *(sys.implementation.name, sys.version_info[:2], numba.__version__, llvmlite.__version__, np.__version__),
-    *(CONFIG.OPT, CONFIG.BOUNDSCHECK, CONFIG.LOOP_VECTORIZE, CONFIG.SLP_VECTORIZE, CONFIG.USING_SVML),
-))  # fmt: skip
+PROCESSOR = Path("/proc/cpuinfo")
+SAID = ("vendor_id", "cpu family", "model", "model name", "stepping", "flags")  # of what a processor is, there
 
 
 class UnknownValueError(Exception):
@@ -58,17 +57,74 @@ def fingerprint(function: Callable[..., Any], options: dict[str, Any], signature
     UnknownValueError
         The function, or one that it calls, names a value of a kind that is not covered.
     """
-    sources = _Sources()
+    sources = _Sources(by_numba=True)
     sources.see(function)
-    text = [TOOLS, _of_options(options), _of_types(signature, sources)]
+    text = [_tools(), _of_options(options), _of_types(signature, sources)]
     text += sources.walk()
     return hashlib.sha256("\n".join(text).encode()).hexdigest()
 
 
-class _Sources:
-    """Functions in the order in which they were met, each described once."""
+def fingerprint_of_call(function: Callable[..., Any], options: dict[str, Any], arguments: tuple[Any, ...]) -> str:
+    """Digest of all that the machine code for a call with such arguments is made from, processor and Numba's version included.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    function, options
+        As of :func:`fingerprint`.
+    arguments : tuple
+        Numbers, arrays of numbers, and tuples of these; their kinds count, not their values.
+
+    Raises
+    ------
+    UnknownValueError
+        As of :func:`fingerprint`; also an argument of another kind.
+    """
+    sources = _Sources(by_numba=False)
+    sources.see(function)
+    text = [_surroundings(), _of_options(options), *(_of_argument(argument, sources) for argument in arguments)]
+    text += sources.walk()
+    return hashlib.sha256("\n".join(text).encode()).hexdigest()
+
+
+@cache
+def _tools() -> str:
+    """Versions and settings that Numba's code depends on."""
+    import llvmlite
+    import numba
+
+    config: Any = numba.config
+    return repr((
+        *(sys.implementation.name, sys.version_info[:2], numba.__version__, llvmlite.__version__, np.__version__),
+        *(config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE, config.USING_SVML),
+    ))  # fmt: skip
+
+
+@cache
+def _surroundings() -> str:
+    """Versions and processor, as they are found without loading Numba; its settings have their defaults."""
+    versions = []
+    for name in ("numba", "llvmlite"):
+        found = find_spec(name)
+        if found is None or found.origin is None:
+            raise UnknownValueError(f"{name} is not installed")
+        versions.append(Path(found.origin).with_name("_version.py").read_text(encoding="utf-8"))
+    with PROCESSOR.open("rb", buffering=0) as file:  # of many processors the first is enough
+        lines = os.read(file.fileno(), 8192).decode("utf-8", "replace").split("\n\n")[0].splitlines()
+    processor = [line for line in lines if line.partition(":")[0].strip() in SAID]
+    return repr((sys.implementation.name, sys.version_info[:2], np.__version__, versions, processor))
+
+
+class _Sources:
+    """Functions in the order in which they were met, each described once.
+
+    Parameters
+    ----------
+    by_numba : bool
+        Whether steps with vectors are described as Numba has them, else as they are made: that loads no Numba.
+    """
+
+    def __init__(self, by_numba: bool) -> None:
+        self.by_numba = by_numba
         self.order: list[Any] = []
         self.place: dict[int, int] = {}
 
@@ -105,6 +161,8 @@ class _Sources:
 
     def of(self, value: Any, names: set[str]) -> str:
         """A value that a function names; `names` are those that it may ask a module for."""
+        if isinstance(value, KernelSource):  # most of them
+            return f"compiled({self.see(value.py_func)}, {_of_options(value.options)})"
         if isinstance(value, Enum):
             return f"{self._of_class(type(value), names)}.{value.name}"
         if value is None or isinstance(value, (bool, int, float, complex, str, bytes)):
@@ -116,29 +174,46 @@ class _Sources:
         if isinstance(value, (np.ndarray, np.generic)):
             array = np.asarray(value)
             return f"array({array.dtype!r}, {array.shape}, {array.flags.c_contiguous}, {array.tobytes()!r})"
-        if isinstance(value, KernelSource):
-            return f"compiled({self.see(value.py_func)}, {_of_options(value.options)})"
-        if isinstance(value, Dispatcher):  # a user's own, by numba.jit
-            return f"jit({self.see(value.py_func)}, {_of_options(value.targetoptions)})"
         if isinstance(value, (Pointer, VectorStep)):
-            return self.of(value.intrinsic, names)
-        if isinstance(value, CFunc):  # a user's own, by numba.cfunc
-            return f"callback({self.see(value.__wrapped__)})"
-        if isinstance(value, _Intrinsic):
-            return f"intrinsic({self.see(value._defn)})"
+            return self.of(value.intrinsic, names) if self.by_numba else self._of_step(value)
         if isinstance(value, CodeType):
             return self.of_code(value, None, names)
         if isinstance(value, type):
             return self._of_class(value, names)
+        if isinstance(value, Remembered):
+            return self.of(value.__wrapped__, names)
         if isinstance(value, FunctionType) and value.__module__.split(".")[0] not in FOREIGN:
             return f"function({self.see(value)})"
         if isinstance(value, ModuleType):
             return self._of_module(value, names)
-        if isinstance(value, (types.Type, np.dtype)):
+        if isinstance(value, np.dtype):
             return repr(value)
         if isinstance(value, (FunctionType, BuiltinFunctionType, np.ufunc)) or type(value).__module__ == "numpy":
             return f"{type(value).__name__} {getattr(value, '__module__', '')}.{value.__name__}"
+        if "numba" in sys.modules:
+            return self._of_numba(value)
         raise UnknownValueError(f"a kernel names {value!r}, of {type(value)}")
+
+    def _of_numba(self, value: Any) -> str:
+        from numba.core import types
+        from numba.core.ccallback import CFunc
+        from numba.core.dispatcher import Dispatcher
+        from numba.core.extending import _Intrinsic
+
+        if isinstance(value, Dispatcher):  # a user's own, by numba.jit
+            return f"jit({self.see(value.py_func)}, {_of_options(value.targetoptions)})"
+        if isinstance(value, CFunc):  # a user's own, by numba.cfunc
+            return f"callback({self.see(value.__wrapped__)})"
+        if isinstance(value, _Intrinsic):
+            return f"intrinsic({self.see(value._defn)})"
+        if isinstance(value, types.Type):
+            return repr(value)
+        raise UnknownValueError(f"a kernel names {value!r}, of {type(value)}")
+
+    def _of_step(self, value: Pointer | VectorStep) -> str:
+        if isinstance(value, Pointer):
+            return f"pointer({value.signature}, {self.see(vars(Pointer)['intrinsic'].func)})"
+        return f"vector({self.see(value.make)}, {value.width})"
 
     def _of_class(self, kind: type, names: set[str]) -> str:
         if issubclass(kind, Enum):
@@ -168,8 +243,26 @@ def _name(kind: type) -> str:
     return f"{kind.__module__}.{kind.__qualname__}"
 
 
+def _of_argument(value: Any, sources: _Sources) -> str:
+    """The kind of an argument, all of it that Numba makes a type of."""
+    kind = type(value)
+    if kind is np.ndarray and value.dtype.kind in "biufc":
+        flags = value.flags
+        layout = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+        return f"array({value.dtype.str}, {value.ndim}, {layout}, {flags.aligned}, {flags.writeable})"
+    if isinstance(value, tuple):
+        return f"{sources.of(kind, set())}({', '.join(_of_argument(v, sources) for v in value)})"
+    if kind in (bool, float, complex, type(None)) or (kind is int and -(2**63) <= value < 2**63):
+        return kind.__name__
+    if isinstance(value, np.generic) and value.dtype.kind in "biufc":
+        return f"number({value.dtype.str})"
+    raise UnknownValueError(f"an argument {value!r}, of {kind}")
+
+
 def _of_types(signature: Any, sources: _Sources) -> str:
     """The types of the arguments. Their own text does not tell two classes of one name apart, nor two functions."""
+    from numba.core import types
+
     if isinstance(signature, tuple):
         return f"({', '.join(_of_types(t, sources) for t in signature)})"
     if not isinstance(signature, types.Type):

@@ -76,10 +76,13 @@ class ReadyLibrary(JITCodeLibrary):
     kernel takes to load.
     """
 
+    machine_code: bytes  # an object file
+
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
         name, _, (machine_code, _) = state
         self = cls(codegen, name)
+        self.machine_code = machine_code  # Numba lets go of it
         self.enable_object_caching()
         self._set_compiled_object(machine_code)
         self._finalize_final_module()

@@ -11,19 +11,14 @@ from __future__ import annotations
 import hashlib
 import io
 import logging
-import os
 import pickle
 import re
 import sys
-import tempfile
-import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from functools import cache, wraps
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from numba.core import config
 from numba.core.compiler import CompileResult
 from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.runtime.nrt import rtsys
@@ -31,13 +26,10 @@ from numba.core.serialize import dumps
 
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
 from truenorth.core.inner_library import KIND, InnerLibrary, ReadyLibrary
-from truenorth.core.kernel_lock import SUFFIX, KernelLock
+from truenorth.core.kernel_folder import folders, prune_once, read, write, write_folder
+from truenorth.core.kernel_lock import KernelLock
 
-PACKAGE = Path(__file__).parents[1]
-BOUND = 512 * 2**20  # bytes that the kernels of all versions may take, before the longest unused go
-DAY = 86400.0  # s
 LOG = logging.getLogger(__name__)  # one line of level INFO for each kernel that has to be compiled
-SUM = 32  # bytes of the checksum that a file begins with
 
 
 class KernelStore:
@@ -54,6 +46,7 @@ class KernelStore:
         self.options = options
         self.files: dict[Any, str | None] = {}  # the name of the file of a signature, as it was when first asked for
         self.locks: dict[Any, KernelLock | None] = {}  # of the signatures that are asked for now
+        self.kernel: Any = None  # the last that was found or compiled
 
     @property
     def cache_path(self) -> str:
@@ -73,6 +66,7 @@ class KernelStore:
             lock.take()
             kernel = self._found(name, target)  # another process has compiled it meanwhile
         if kernel is not None:
+            self.kernel = kernel
             return kernel
         if name and "<locals>" in self.function.__code__.co_qualname:
             # The linker takes what has one name for one function, and a function made anew has the name of the last.
@@ -114,6 +108,7 @@ class KernelStore:
 
     def save_overload(self, signature: Any, kernel: Any) -> None:
         """Keep a kernel; one that holds an address of this process is not kept."""
+        self.kernel = kernel
         kernel.library._ensure_finalized()
         if not isinstance(kernel.library, InnerLibrary):
             for environment in kernel._find_referenced_environments():  # of the kernels that it took up
@@ -123,7 +118,7 @@ class KernelStore:
         if folder is None or name is None or kernel.library.has_dynamic_globals or kernel.lifted:
             return
         try:
-            _write(folder / name, dumps(kernel._reduce()))
+            write(folder / name, dumps(kernel._reduce()))
         except OSError:  # a full disk costs the next process a compilation, not this one its answer
             return
         prune_once(folder)
@@ -146,43 +141,12 @@ class KernelStore:
         return self.files[signature]
 
 
-@cache
-def folders() -> tuple[Path, ...]:
-    """Where kernels are looked for: the environment's own choice alone; else the user's cache, then the package's."""
-    chosen = getattr(config, "CACHE_DIR", "")
-    if chosen:
-        return (Path(chosen) / "truenorth",)
-    places = (_user_cache, lambda: PACKAGE / "__pycache__")
-    found = []
-    for place in places:
-        try:
-            found.append(place() / "kernels")
-        except RuntimeError:  # a user without a home
-            continue
-    return tuple(found)
-
-
-def _user_cache() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "truenorth"
-
-
-@cache
-def write_folder() -> Path | None:
-    """The first of the folders that can be written to; without any, each process compiles for itself."""
-    for folder in folders():
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-        except OSError:
-            continue
-    return None
-
-
 def _rebuilt(target: Any, callback: bool, code: Any, fndesc: Any, environment: Any, *rest: Any) -> Any:
     """A kernel from what it was reduced to: with the code that it is used for, Numba's own rebuilds all of it."""
     if callback:
-        return CompileResult._rebuild(target, code, fndesc, environment, *rest)
+        kernel: Any = CompileResult._rebuild(target, code, fndesc, environment, *rest)
+        kernel.library.machine_code = code[2][0]
+        return kernel._replace(referenced_envs=rest[-1])
     signature, objectmode, lifted, annotation, initial, environments = rest
     for begin in initial:
         begin()
@@ -240,56 +204,24 @@ def _environment(module: str, constants: Any, name: str) -> Any:
 
 
 def _read(path: Path) -> Any:
-    """What a file holds; None where it is missing, or was torn by a loss of power."""
+    """What a file holds; None where it is missing or torn."""
+    content = read(path)
     try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    if hashlib.sha256(content[SUM:]).digest() != content[:SUM]:
-        return None
-    with suppress(OSError):  # gone since, or of another user
-        if time.time() - path.stat().st_mtime > DAY:
-            os.utime(path)  # used today: the last to be pruned
-    try:
-        return _Unpickler(io.BytesIO(content[SUM:])).load()
+        return None if content is None else _Unpickler(io.BytesIO(content)).load()
     except ImportError:  # of a module that was run from a file without a name to import it by
         return None
 
 
-def _write(path: Path, content: bytes) -> None:
-    handle, aside = tempfile.mkstemp(dir=path.parent, suffix=".aside")
+def machine_code_of(kernel: Any) -> bytes | None:
+    """The object file of a kernel, where its code needs no object of Python's and no address of this process."""
+    library = kernel.library
+    from_disk = hasattr(library, "machine_code")
+    others = kernel.referenced_envs if from_disk else kernel._find_referenced_environments()
+    if any(environment.consts for environment in (kernel.environment, *others)):
+        return None
+    if kernel.lifted or library.has_dynamic_globals:
+        return None
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(content).digest() + content)
-        os.chmod(aside, 0o644)
-        os.replace(aside, path)
-    except BaseException:
-        Path(aside).unlink(missing_ok=True)
-        raise
-
-
-@cache
-def prune_once(folder: Path) -> None:
-    """Once in a process that compiles: keep the folder within its bound."""
-    prune(folder, BOUND)
-
-
-def prune(folder: Path, bound: int) -> None:
-    """Delete the kernels that were used longest ago until the others take three quarters of `bound` bytes.
-
-    What was left aside by a process that was killed goes after a day.
-    """
-    kept = sorted(_aged(folder), reverse=True)
-    total = sum(size for _, size, _ in kept)
-    room = bound * 3 // 4 if total > bound else total
-    for used, size, path in kept:
-        room -= size
-        if room < 0 or (path.suffix in (".aside", SUFFIX) and time.time() - used > DAY):
-            path.unlink(missing_ok=True)
-
-
-def _aged(folder: Path) -> Iterator[tuple[float, int, Path]]:
-    for path in folder.iterdir():
-        with suppress(OSError):  # another process prunes
-            status = path.stat()
-            yield status.st_mtime, status.st_size, path
+        return bytes(library.machine_code if from_disk else library._get_compiled_object())
+    except (ValueError, RuntimeError):  # Numba has none
+        return None

@@ -91,7 +91,7 @@ def _choose_by_type() -> None:
         overload(step, jit_options=inlined, strict=False)(chosen_of(step))
 
 
-@compiled
+@compiled(prepare=_choose_by_type)
 def linear_runs(size: Size, system: Runs, epochs: int, options: Any, out: Histories) -> None:
     """Filter each run."""
     rows = system.z.shape[2]
@@ -168,7 +168,6 @@ def run_linear(
 
     `joseph` is of the Kalman filter alone, by whose covariance runs that share a system can go together, and so is `device`.
     """
-    _choose_by_type()
     there = joseph is not None and on_cuda(device, system)
     if there:
         running["workers"] = min(1, running.get("workers", 1))  # threads would only wait for one another

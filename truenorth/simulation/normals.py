@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.compiled import borrowing, compiled
+from truenorth.core.numba_part import numba_part
 
 Words = NDArray[np.uint64]
 
@@ -84,8 +85,7 @@ def words_of(normals: Normals) -> int:
 @cache
 def _tables() -> tuple[Words, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """``A_k``, and the tables of the ziggurat, as Numba has them of NumPy."""
-    from numba.np.random import _constants as tables
-
+    tables = numba_part("np.random._constants")
     factor, ahead = 1, np.empty((2, BLOCK + 1), dtype=np.uint64)
     for k in range(BLOCK + 1):
         ahead[:, k] = _halves(factor)
