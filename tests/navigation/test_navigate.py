@@ -104,7 +104,7 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
     assert len(words) == 1
     assert "late" in words[0]
     assert "latency of 0.3" in words[0] or "latency of 0.29" in words[0]
-    early = navigate(record, start, aid=Gnss(late.shifted(-0.6)), imu=SPEC)
+    early = navigate(record, start, aid=Gnss(late.shifted(-0.6), Mounting()), imu=SPEC)
     words = [reason for reason in early.reasons if "early: shift the times of that log by 0." in reason]
     assert words[0].split(" by ")[1][:4] in ("0.29", "0.30")
     aids = Gnss(late.shifted(-0.3)), Gnss(late, Mounting(latency=0.3)), Gnss(late, Mounting(latency_sigma=0.5))
