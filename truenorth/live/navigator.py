@@ -377,7 +377,7 @@ class Navigator:
         wanders: list[Evidence] = []
         if isinstance(receiver, Gnss):
             track, wanders = known_as_followed(track, receiver, self.altitude)
-        slow = {item.figures["name"] for item in wanders}
+        slow = {str(item.figures["name"]) for item in wanders}
         evidence = [*innovation_evidence(track.residuals, last_sigma(track), in_sigma=slow), *wanders, *self._why]
         result = Navigation(
             "navigated", (), track, self.altitude, False, tuple(self._gaps), 0, self._imu_source, "live"
