@@ -37,7 +37,7 @@ STRETCHES = (32, 40)
 SHORTEST = 32  # rows of one
 PARTS = 8  # of the log, that must all agree
 # Rows in which sensors take their turns; of four every second row differs, too, and of six.
-PERIODS = {2: "record.alternates", 3: "record.in_threes", 5: "record.in_fives"}
+PERIODS = {2: "record.alternates", 3: "record.in_turn", 5: "record.in_turn"}
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
@@ -163,7 +163,8 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
         if turned > 0.0:  # few logs come so far
             turned = min(turned, _turned(record, period, STRETCHES[1]))
         if turned > 0.0:
-            figures: dict[str, Figure] = {"size": turned * GRAVITY_EQUATOR * period / (period - 1.0), "level": turned}
+            size = turned * GRAVITY_EQUATOR * period / (period - 1.0)
+            figures: dict[str, Figure] = {"size": size, "level": turned} | ({"rows": period} if period > 2 else {})
             found.append(Evidence(key, figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",)))
     return found
 
