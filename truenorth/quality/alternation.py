@@ -164,7 +164,8 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
             turned = min(turned, _turned(record, period, STRETCHES[1]))
         if turned > 0.0:
             size = turned * GRAVITY_EQUATOR * period / (period - 1.0)
-            figures: dict[str, Figure] = {"size": size, "level": turned} | ({"rows": period} if period > 2 else {})
+            rows: dict[str, Figure] = {"rows": period} if period > 2 else {}
+            figures: dict[str, Figure] = {"size": size, "level": turned} | rows
             found.append(Evidence(key, figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",)))
     return found
 
