@@ -165,7 +165,7 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
         if turned > 0.0:
             size = turned * GRAVITY_EQUATOR * period / (period - 1.0)
             rows: dict[str, Figure] = {"rows": period} if period > 2 else {}
-            figures: dict[str, Figure] = {"size": size, "level": turned} | rows
+            figures: dict[str, Figure] = {"size": size, "level": turned, **rows}
             found.append(Evidence(key, figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",)))
     return found
 
