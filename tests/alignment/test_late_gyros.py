@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from truenorth.alignment.late_gyros import turned_by
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.estimate.sensor_delay import gyros_behind
+from truenorth.records import ImuRecord
 
 
 @pytest.mark.parametrize(("run", "late"), [(1, 0.01), pytest.param(3, 0.02, marks=pytest.mark.slow)])
@@ -46,3 +48,12 @@ def test_sound_sways_have_gyros_of_one_moment(bench):
         inputs, _ = BENCHES[bench].draw(515, run)
         keys |= {item.key for item in BENCHES[bench].align(inputs).evidence}
     assert not {"response.gyros_late", "response.gyros_early", "heave.delay"} & keys
+
+
+def test_rows_without_any_force_have_no_vertical_to_turn_about():
+    """Found by the fuzzer: three accelerometers that read zero for a moment made the effect of a delay NaN."""
+    gyro, accel = np.tile([0.0, 0.0, 0.1], (100, 1)), np.tile([0.0, 0.0, 9.8], (100, 1))
+    accel[40:45] = 0.0
+    effect = turned_by(0.01, ImuRecord(0.01 * np.arange(1, 101), gyro, accel))
+    assert effect.heading > 0.0
+    assert effect.level == 0.0

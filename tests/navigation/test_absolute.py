@@ -8,7 +8,9 @@ import pytest
 from tests.navigation.test_navigate import SPEC, drive, fixes
 from truenorth.aiding.aids import Gnss
 from truenorth.navigation import Mounting, navigate
-from truenorth.quality.absolute import accuracy_of
+from truenorth.quality.absolute import accuracy_of, known_as_followed
+from truenorth.state.layout import DP
+from truenorth.state.track import Residuals, Track
 
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
@@ -48,3 +50,22 @@ def test_a_receiver_that_says_nothing_is_known_by_the_kind_of_its_fixes(drive, q
         record = replace(record, quality=np.full(len(record), float(quality)))
     assert accuracy_of(record)[:2] == pytest.approx(level)
     assert accuracy_of(record)[2] > level
+
+
+@pytest.mark.parametrize("lasts", [False, True])
+def test_a_loop_that_follows_a_slow_error_knows_place_no_better_than_that(drive, lasts):
+    """Innovations of 4 m that last for 20 rows, of a receiver that says nothing; of white ones as large nothing is said."""
+    time = np.arange(1.0, 400.0)
+    noise = np.random.default_rng(7).standard_normal((len(time) + 40, 3))
+    kernel = np.exp(-np.arange(40) / 20.0) if lasts else np.eye(1, 40)[0]
+    error = 4.0 * np.column_stack([np.convolve(axis, kernel / np.linalg.norm(kernel), "valid") for axis in noise.T])
+    error = error[: len(time)]
+    said_of_it, nis, used = np.full((len(time), 3), 4.0), np.full(len(time), 3.0), np.ones(len(time), dtype=bool)
+    seen = Residuals("GNSS position", time, error, said_of_it, nis, used, 0, time, ~used, "m")
+    track = Track.along(drive[0].states(time[-1:]))
+    track = replace(track, P=0.01 * np.eye(track.sensors.shape[1])[None], residuals=(seen,))
+    record = replace(fixes(drive[0], np.arange(1.0, 179.0), 0.3), position_sigma=None)
+    found, said = known_as_followed(track, Gnss(record), "gnss")
+    assert [item.key for item in said] == (["innovations.wander"] if lasts else [])
+    sigma = found.sigma[-1, DP]
+    assert sigma[0] == pytest.approx(2.0) if not lasts else np.all((sigma > 4.0) & (sigma < 16.0))

@@ -49,8 +49,16 @@ def test_half_the_turn_of_one_against_the_other_is_found(kind, degrees):
 @pytest.mark.parametrize("degrees", [0.05, 1.0])
 def test_of_one_in_three_two_thirds_of_its_turn_are_found(kind, degrees):
     (found,) = alternation_evidence(two_in_turn(still(1, kind), [np.radians(degrees), 0.0, 0.0], 3))
-    assert found.key == "record.in_threes"
+    assert (found.key, found.figures["rows"]) == ("record.in_turn", 3)
     assert found.effect.level == pytest.approx(2.0 / 3.0 * np.radians(degrees), rel=0.06)
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("degrees", [0.1, 1.0])
+def test_of_one_in_five_four_fifths_of_its_turn_are_found(kind, degrees):
+    (found,) = alternation_evidence(two_in_turn(still(1, kind), [np.radians(degrees), 0.0, 0.0], 5))
+    assert (found.key, found.figures["rows"]) == ("record.in_turn", 5)
+    assert found.effect.level == pytest.approx(0.8 * np.radians(degrees), rel=0.06)
 
 
 @pytest.mark.parametrize("degrees", [0.1, 1.0])
@@ -61,25 +69,27 @@ def test_of_one_in_four_every_second_row_differs(degrees):
     assert found.effect.level == pytest.approx(np.radians(degrees) / 4.0, rel=0.06)
 
 
-@pytest.mark.parametrize("procedure", ["still", "swaying", "rotary", "gnss", "transfer", "attitude"])
-def test_one_in_three_is_found_on_every_procedure(procedure):
-    """Once silent: of twelve logs twelve, by 7 to 84 sigmas."""
+@pytest.mark.parametrize("period", [3, 5])
+@pytest.mark.parametrize("procedure", ["still", "swaying", "rotary", "gnss", "odometer", "transfer", "attitude"])
+def test_one_in_so_many_is_found_on_every_procedure(procedure, period):
+    """Once silent: of one in three twelve of twelve, by 7 to 84 sigmas, of one in five 33 of 40, by 3 to 156."""
     for run in (0, 2):
         record = BENCHES[procedure].draw(771240, run)[0]["record"]
         assert not alternation_evidence(record)
-        (found,) = alternation_evidence(two_in_turn(record, np.radians([0.3, 0.2, 0.3]), 3))
-        assert found.key == "record.in_threes"
+        (found,) = alternation_evidence(two_in_turn(record, np.radians([0.3, 0.2, 0.3]), period))
+        assert found.figures["rows"] == period
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_an_engine_near_a_third_of_the_rate_is_none(seed):
+@pytest.mark.parametrize("part", [1 / 3, 1 / 5, 2 / 5])
+@pytest.mark.parametrize("seed", range(15))
+def test_an_engine_near_a_part_of_the_rate_is_none(seed, part):
     rng = np.random.default_rng([seed, 771241])
-    frequency = RATE / 3.0 + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-2.0, 1.0)
+    frequency = RATE * part + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-2.0, 1.0)
     kind = ("rates", "increments")[seed % 2]
     assert not alternation_evidence(still(seed, kind, vibration=rng.uniform(0.05, 2.0), frequency=frequency))
 
 
-@pytest.mark.parametrize("period", [2, 3])
+@pytest.mark.parametrize("period", [2, 3, 5, 2.5])
 def test_a_beat_that_goes_round_once_in_a_stretch_is_a_vibration(period):
     """Of every stretch the same little is left then: of 36 shaken logs three alternated by that."""
     beat = 32.0 / SPAN

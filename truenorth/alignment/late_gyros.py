@@ -74,10 +74,15 @@ def late_gyros_evidence(fine: FineAlignment, response: Array, record: ImuRecord)
 
 
 def turned_by(delay: float, record: ImuRecord) -> Effect:
-    """What an IMU turns about the level and about the vertical in the time of a delay (s), at any moment of its record."""
+    """What an IMU turns about the level and about the vertical in the time of a delay (s), at any moment of its record.
+
+    Rows without any force, of an accelerometer that was silent there, have no vertical and are left out.
+    """
     turned = FASTEST * abs(delay)
-    rate = record.gyro / (record.interval if record.kind == "increments" else 1.0)
-    up = record.accel / np.linalg.norm(record.accel, axis=1, keepdims=True)
+    force = np.linalg.norm(record.accel, axis=1, keepdims=True)
+    there = force[:, 0] > 0.0
+    rate = record.gyro[there] / (record.interval if record.kind == "increments" else 1.0)
+    up = record.accel[there] / force[there]
     about = np.sum(rate * up, axis=1)
     tilt = turned * math.sqrt(max(float(np.mean(np.sum(rate**2, axis=1) - about**2)), 0.0))
     return Effect(heading=turned * math.sqrt(float(np.mean(about**2))), level=tilt)

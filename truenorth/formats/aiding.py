@@ -23,6 +23,7 @@ from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import options_for, without_imu
 from truenorth.formats.opening import columns_of
 from truenorth.formats.order import ordered
+from truenorth.formats.phone import new_fixes
 from truenorth.formats.positions import columns_of_positions
 from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, find
 from truenorth.records import EncoderRecord, HeightRecord, OdometerRecord, VelocityRecord
@@ -57,9 +58,16 @@ NAVIGATION = (
     Quantity("VU", "speed", "m/s", ("vel_u", "v_u", "v_upward"), ("VD", "vel_d", "v_d", "v_downward"), "velocity"),
 )
 PLACE = (
-    Quantity("lat", "angle", "deg", ("latitude",), (), "position"),
-    Quantity("lon", "angle", "deg", ("longitude", "lng"), (), "position"),
-    Quantity("alt", "length", "m", ("altitude", "height", "h", "hgt", "ellipsoidal_height"), ("depth",), "height"),
+    Quantity("lat", "angle", "deg", ("latitude", "location_latitude"), (), "position"),
+    Quantity("lon", "angle", "deg", ("longitude", "lng", "location_longitude"), (), "position"),
+    Quantity(
+        "alt",
+        "length",
+        "m",
+        ("altitude", "height", "h", "hgt", "ellipsoidal_height", "location_altitude"),
+        ("depth",),
+        "height",
+    ),
 )
 INDEXER = tuple(
     Quantity(f"angle_{i}", "angle", "deg", (f"axis_{i}", "angle") if i == 1 else (f"axis_{i}",), (), "angles")
@@ -276,7 +284,8 @@ def open_log(
             raise DataError(
                 f"{path.name}: numbers, and no header of names above them; expected one such as {example}: add it"
             )
-        return ordered(find(columns, quantities, options)), others
+        found = ordered(find(columns, quantities, options))
+        return new_fixes(found, columns.names) if part == "gnss" and not device else found, others
     except OSError as error:
         raise unreadable(path, error) from None
 

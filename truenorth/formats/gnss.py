@@ -12,6 +12,7 @@ from truenorth.core.paths import as_path, unreadable
 from truenorth.core.position import Position
 from truenorth.formats.aiding import NAVIGATION, PLACE, FilePath, Pairs, known, made, open_log, sigmas
 from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
+from truenorth.formats.phone import PHONE, accuracies, speed_and_bearing
 from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Quantity
 from truenorth.records import GnssRecord
@@ -49,7 +50,19 @@ BASELINE_SIGMA = 0.01  # m, of each axis of a baseline by carrier phases whose r
 RECEIVER = (Quantity("hdop"), Quantity("vdop"), Quantity("quality", aliases=("fix", "fix_quality")))
 ANTENNAS = (*HEADING, *BASELINE)
 QUANTITIES = (
-    *(TIME, *PLACE, *NAVIGATION, *TRACK, *SIGMAS, *ANTENNAS, *RECEIVER, *EARTH_FIXED, *EARTH_FIXED_VELOCITY, *LOCAL),
+    *(
+        TIME,
+        *PLACE,
+        *NAVIGATION,
+        *TRACK,
+        *PHONE,
+        *SIGMAS,
+        *ANTENNAS,
+        *RECEIVER,
+        *EARTH_FIXED,
+        *EARTH_FIXED_VELOCITY,
+        *LOCAL,
+    ),
 )
 
 
@@ -115,10 +128,15 @@ def read_gnss(
     for name in ("lat", "lon", "alt", "v_n", "heading"):
         if values.get(name) is not None and no_fix.any():
             values[name] = np.where(no_fix if values[name].ndim == 1 else no_fix[:, None], np.nan, values[name])
-    values.setdefault("position_sigma", known(found.stack("sigma_E", "sigma_N", "sigma_U")))
-    values.setdefault("velocity_sigma", known(found.stack("sigma_VE", "sigma_VN", "sigma_VU")))
+    of_place, of_velocity = accuracies(found)
+    values.setdefault("position_sigma", known(_or(found.stack("sigma_E", "sigma_N", "sigma_U"), of_place)))
+    values.setdefault("velocity_sigma", known(_or(found.stack("sigma_VE", "sigma_VN", "sigma_VU"), of_velocity)))
     dop = known(found.stack("hdop", "vdop"))
     return made(found, GnssRecord, **values, dop=dop, quality=found.values.get("quality"))
+
+
+def _or(first: Array | None, second: Array | None) -> Array | None:
+    return second if first is None else first
 
 
 def _heading(found: Found) -> dict[str, Any]:
@@ -193,9 +211,9 @@ def _local(found: Found, origin: Position | None) -> dict[str, Any]:
 
 def _velocity(found: Found) -> Array | None:
     """Velocity in n, from its components or from speed and course."""
-    v_n = found.stack("VE", "VN", "VU")
-    if v_n is None and found.has("speed", "course"):
-        speed, course = found.values["speed"], found.values["course"]
+    v_n, of_phone = found.stack("VE", "VN", "VU"), speed_and_bearing(found)
+    if v_n is None and (of_phone is not None or found.has("speed", "course")):
+        speed, course = of_phone or (found.values["speed"], found.values["course"])
         # A receiver that stands still leaves its course empty.
         course = np.where((speed == 0.0) & np.isnan(course), 0.0, course)
         v_n = np.column_stack([speed * np.sin(course), speed * np.cos(course), np.full(len(speed), np.nan)])

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.formats.content import REMARKS
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import finish
-from truenorth.formats.text import REMARKS, open_table
+from truenorth.formats.text import open_table
 from truenorth.records import Guess, ImuRecord
 
 Array = NDArray[np.float64]

@@ -15,9 +15,10 @@ import numpy as np
 
 from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
+from truenorth.formats.content import REMARKS
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import finish
-from truenorth.formats.text import REMARKS, TextTable, open_table
+from truenorth.formats.text import TextTable, open_table
 from truenorth.records import ImuRecord
 
 EXPECTED = "rows of gx gy gz ax ay az [t], increments in rad and m/s"

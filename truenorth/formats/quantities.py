@@ -44,7 +44,7 @@ class Quantity:
     group: str = ""  # by which `units` may name it along with others, such as ``velocity``
 
 
-TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc"))
+TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc", "time_since_start_in"))
 
 
 @dataclass(frozen=True)
@@ -248,12 +248,13 @@ def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[tuple[Quant
 
 
 def _key(name: str) -> str:
-    return re.sub(r"[\s\-]+", "_", name.strip()).casefold()
+    return re.sub(r"[\s\-]+", "_", name.strip(" \t:")).casefold()
 
 
 def _unit(quantity: Quantity, stated: str | None, options: Options) -> str | None:
     """The unit that the caller says, or else the heading; None: neither does."""
-    return options.units.get(quantity.name, options.units.get(quantity.group)) or stated
+    written = None if stated is None else unit_in(stated) or stated
+    return options.units.get(quantity.name, options.units.get(quantity.group)) or written
 
 
 def _factor(quantity: Quantity, stated: str | None, label: str, options: Options, source: str) -> float:

@@ -1,14 +1,11 @@
-"""Tables in text, in whatever dialect: the separator, the decimal mark, lines above the header, the header itself.
+"""Tables in text, in whatever dialect (:mod:`truenorth.formats.dialect`): lines above the header, the header itself, the rows.
 
-The dialect is the one in which most lines of the log's head split into as many numbers. Arrow then reads the columns; the
-lines are looked at one by one only to say where a fault is.
+Arrow reads the columns; the lines are looked at one by one only to say where a fault is.
 """
 
 from __future__ import annotations
 
-import csv
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,8 +17,9 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
-from truenorth.formats.content import REMARKS, REMARKS_BYTES, text_of
-from truenorth.formats.quotes import is_open, plain_cells, without_outer_quotes, without_stray_quotes
+from truenorth.formats.content import REMARKS_BYTES, text_of
+from truenorth.formats.dialect import DELIMITERS, EITHER, SAMPLE, Dialect, dialect_of, is_remark, with_points
+from truenorth.formats.quotes import without_outer_quotes, without_stray_quotes
 from truenorth.records import Record
 
 if TYPE_CHECKING:
@@ -29,54 +27,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NUMBER = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII)
-STAMP = re.compile(
-    r"(?:\d{2,4}[-/.]\d{1,2}[-/.]\d{2,4}[T ]?)?(?:\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?)?(?:Z|[+-]\d\d:?\d\d)?", re.ASCII
-)
-DELIMITERS = (",", ";", "\t", "|", None)  # None: blanks
 LONGEST_LINE = 65536
 MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
 HEADER_LINES = 400  # more lines than this above the numbers are no header
-SAMPLE = 40  # lines by which the dialect is judged
-
-
-@dataclass(frozen=True)
-class Dialect:
-    """How the lines of a table are cut into cells: `delimiter` (None: blanks) and the `decimal` mark."""
-
-    delimiter: str | None
-    decimal: str
-
-    def cells(self, line: str) -> list[str]:
-        """The cells of a line, without blanks and quotes around them."""
-        if self.delimiter is None:
-            return [cell.strip('"') for cell in line.split()]
-        if '"' not in line:
-            return [cell.strip() for cell in line.split(self.delimiter)]
-        if is_open(line, self.delimiter):
-            return plain_cells(line, self.delimiter)
-        row = next(csv.reader([line], delimiter=self.delimiter, skipinitialspace=True), [])
-        return [cell.strip().strip('"').strip() for cell in row]
-
-    def is_number(self, cell: str) -> bool:
-        """Whether a cell is a number in this dialect."""
-        if self.decimal == ",":
-            return "." not in cell and NUMBER.fullmatch(cell.replace(",", ".", 1)) is not None
-        return NUMBER.fullmatch(cell) is not None
-
-    def share(self, cells: Sequence[str]) -> float:
-        """Share of cells that are numbers, dates or times; an empty one counts a little less."""
-        if not cells:
-            return 0.0
-        return sum(1.0 if self.is_number(c) or (c and STAMP.fullmatch(c)) else 0.9 * (not c) for c in cells) / len(
-            cells
-        )
-
-    def words(self) -> str:
-        """What it is, for people."""
-        named = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", None: "blanks"}[self.delimiter]
-        return f"{named} between the columns" + (", decimal commas" if self.decimal == "," else "")
 
 
 @dataclass(frozen=True)
@@ -209,12 +163,11 @@ class TextTable:
             for i in columns:
                 cell = cells[i]
                 if not self.dialect.is_number(cell) and (cell or not gaps):
-                    hint = (
-                        "write decimals as in the rows above" if "," in cell else "remove the line or repair the cell"
-                    )
-                    return DataError(
-                        f"{source}: line {number}, column {self.names[i]}: {cell!r}; expected a number: {hint}"
-                    )
+                    comma = self.dialect.decimal == ","
+                    mark = f"a number with a decimal {'comma' if comma else 'point'}, as in most rows: write all with one mark"
+                    other = replace(self.dialect, decimal="." if comma else ",").is_number(cell)
+                    hint = mark if other else "a number: remove the line or repair the cell"
+                    return DataError(f"{source}: line {number}, column {self.names[i]}: {cell!r}; expected {hint}")
         return None
 
 
@@ -241,12 +194,12 @@ def open_table(path: Path) -> TextTable:
     head = _head(path, text)
     if not head:
         raise DataError(f"{path.name}: no header and no numbers; the file holds empty lines only")
-    dialect, count = _dialect(head)
+    dialect, count = dialect_of(head)
     text, mended = without_stray_quotes(
         path.name, text, dialect.delimiter, count, lambda cells: _are_row(dialect, cells, count)
     )
     head = _head(path, text) if mended else head
-    rows = [not _is_remark(line) and _are_row(dialect, dialect.cells(line), count) for _, line in head]
+    rows = [not is_remark(line) and _are_row(dialect, dialect.cells(line), count) for _, line in head]
     first = rows.index(True) if any(rows) else None
     notes = tuple(said for said in (note, mended) if said is not None)
     if first is None:
@@ -257,12 +210,16 @@ def open_table(path: Path) -> TextTable:
     lost = [
         head[k][0]
         for k in range(max(used, default=-1) + 1, first)
-        if not _is_remark(head[k][1]) and all(map(dialect.is_number, dialect.cells(head[k][1])))
+        if not is_remark(head[k][1]) and all(map(dialect.is_number, dialect.cells(head[k][1])))
     ]
     if lost:
         notes += (f"lines of numbers that are no whole row left out: {len(lost)}, the first is line {lost[0]}",)
     header = head[min(k for k in used if k >= 0)][1] if named else ""
     names = names if named else [str(i + 1) for i in range(count)]
+    if dialect.decimal == EITHER:
+        text = with_points(path.name, text, head[first][0] - 1, names, dialect)
+        dialect = replace(dialect, decimal=".")
+        notes += ("decimal points in some columns, commas in others",)
     return _without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
 
 
@@ -280,7 +237,7 @@ def _head(path: Path, text: bytes) -> list[tuple[int, str]]:
             line = raw.decode("latin-1")  # names of columns in another encoding; the numbers are the same in all
         if not line.strip():
             continue
-        if not _is_remark(line) and (
+        if not is_remark(line) and (
             len(line) > LONGEST_LINE or max(line.count(mark or " ") for mark in DELIMITERS) > MOST_COLUMNS
         ):
             raise DataError(
@@ -289,31 +246,6 @@ def _head(path: Path, text: bytes) -> list[tuple[int, str]]:
             )
         lines.append((number, line))
     return lines
-
-
-def _dialect(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
-    """The dialect of the last lines of the head, and how many cells they have."""
-    lines = [line for _, line in head if not _is_remark(line)][-SAMPLE:]
-    lines = lines[:-1] if len(lines) > 2 else lines  # the last one may be cut
-    best, count, highest = Dialect(",", "."), 0, -1.0
-    for decimal in (".", ","):
-        for delimiter in DELIMITERS:
-            if delimiter == decimal:
-                continue
-            dialect = Dialect(delimiter, decimal)
-            rows = [dialect.cells(line) for line in lines]
-            size, rows_of_size = Counter(len(row) for row in rows if row).most_common(1)[0] if any(rows) else (0, 0)
-            numbers = [dialect.share(row) for row in rows if len(row) == size]
-            alone = 0.5 if size < 2 else 1.0  # a table has several columns
-            score = alone * rows_of_size / max(1, len(lines)) * (sum(numbers) / max(1, len(numbers)))
-            # Of equals the dialect of more columns: a line of one cell is a number in none or in all of them.
-            if (score, size) > (highest + 1e-9, 0) or (abs(score - highest) <= 1e-9 and size > count):
-                best, count, highest = dialect, size, score
-    return best, count
-
-
-def _is_remark(line: str) -> bool:
-    return line.lstrip().startswith(REMARKS)
 
 
 def _are_row(dialect: Dialect, cells: Sequence[str], count: int) -> bool:
@@ -329,7 +261,7 @@ def _header(
     unit_line = -1
     for k in range(len(above) - 1, -1, -1):
         line = above[k][1]
-        plain = line.lstrip("#%/ \t") if _is_remark(line) else line
+        plain = line.lstrip("#%/ \t") if is_remark(line) else line
         for delimiter in (dialect.delimiter, *DELIMITERS):
             names = Dialect(delimiter, ".").cells(plain)
             if len(names) == count - 1 and not first_cells[-1]:
@@ -337,7 +269,7 @@ def _header(
             if len(names) == count and not all(map(dialect.is_number, names)):
                 break
         else:
-            listed = dialect.delimiter is not None and not _is_remark(line) and k == len(above) - 1
+            listed = dialect.delimiter is not None and not is_remark(line) and k == len(above) - 1
             if listed and len(dialect.cells(line)) >= max(3, count // 2):
                 raise DataError(
                     f"{path.name}: line {above[k][0]}: a header of {len(dialect.cells(line))} columns above rows of {count}; "
@@ -365,7 +297,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def _without_rows(path: Path, text: bytes, head: list[tuple[int, str]], notes: tuple[str, ...]) -> TextTable:
-    number, line = next(((n, line) for n, line in reversed(head) if not _is_remark(line)), head[-1])
+    number, line = next(((n, line) for n, line in reversed(head) if not is_remark(line)), head[-1])
     cells = [Dialect(delimiter, ".").cells(line) for delimiter in DELIMITERS]
     names = max(cells, key=len)
     if len(names) < 2:

@@ -37,11 +37,11 @@ from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.given import kept_altitude, mountings_found, turns_velocity
 from truenorth.navigation.procedure import FINE, PLUMB_LINE, start_of
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
-from truenorth.quality.absolute import known_as_fixes
+from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import note
+from truenorth.state.evidence import Evidence, note
 from truenorth.state.layout import DP, DV
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
@@ -374,10 +374,11 @@ class Navigator:
         receiver = (
             None if Gnss.key not in self.feeds else self.feeds[Gnss.key].newest(NEWEST, self._mountings.get(Gnss.key))
         )
+        wanders: list[Evidence] = []
         if isinstance(receiver, Gnss):
-            said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
-            track = known_as_fixes(track, receiver.record, said_of)
-        evidence = [*innovation_evidence(track.residuals, last_sigma(track)), *self._why]
+            track, wanders = known_as_followed(track, receiver, self.altitude)
+        slow = {str(item.figures["name"]) for item in wanders}
+        evidence = [*innovation_evidence(track.residuals, last_sigma(track), in_sigma=slow), *wanders, *self._why]
         result = Navigation(
             "navigated", (), track, self.altitude, False, tuple(self._gaps), 0, self._imu_source, "live"
         )

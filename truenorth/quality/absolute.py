@@ -13,9 +13,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.aids import Gnss
 from truenorth.aiding.sensors import place_axes, place_sigma
-from truenorth.quality.slow_aids import Lasting, says_size, usual_bias
+from truenorth.quality.slow_aids import FIXES, Lasting, as_lasting, says_size, slow_errors, usual_bias, with_slow
 from truenorth.records import GnssRecord
+from truenorth.state.evidence import Evidence
 from truenorth.state.layout import DP
 from truenorth.state.limits import limit
 from truenorth.state.track import Track
@@ -58,3 +60,24 @@ def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None, 
         wide = np.maximum(P[:, at, at], least**2)
     P[:, at, at] = np.where(known, wide, P[:, at, at])
     return replace(track, P=P)
+
+
+def known_as_followed(track: Track, receiver: Gnss, altitude: str) -> tuple[Track, list[Evidence]]:
+    """The track of a loop that has no states for slow errors of its fixes, and what is to be said of such errors.
+
+    The loop follows a slow error. So position is known no better than by a fix (:func:`known_as_fixes`), nor than the slow error
+    that the innovations up to now show. What their colour says of position is in sigma then.
+
+    Parameters
+    ----------
+    track : Track
+        With the innovations of the receiver.
+    receiver : Gnss
+        Its newest rows.
+    altitude : str
+        How height is kept.
+    """
+    fixes = [source for source in receiver.sources(altitude) if source.name == FIXES]
+    slow, said = slow_errors(track, fixes)
+    bias = None if receiver.mounting is None else receiver.mounting.bias_sigma
+    return as_lasting(known_as_fixes(track, receiver.record, bias), with_slow(fixes, slow)), said

@@ -10,6 +10,9 @@ alternates as ``theta x f``. It is found by least squares over the log, and each
 
 Three sensors in turn, or one in three, have the same at a third of the rate, where the fourth differences have the gain 9/16: a
 size with a phase, a complex number. One sensor in three that is turned by an angle stands 2/3 of it from the mean of all.
+
+One in five shows at a fifth and at two fifths of the rate, at both by 2/5 of its turn; it stands 4/5 of it from the mean. Engines
+and mains hum at a fifth of some rate as well, seldom at two fifths, too, and as steadily: both must show it.
 """
 
 from __future__ import annotations
@@ -33,8 +36,8 @@ Array = NDArray[np.float64]
 STRETCHES = (32, 40)
 SHORTEST = 32  # rows of one
 PARTS = 8  # of the log, that must all agree
-# Rows in which sensors take their turns; of four every second row differs, too.
-PERIODS = {2: "record.alternates", 3: "record.in_threes"}
+# Rows in which sensors take their turns; of four every second row differs, too, and of six.
+PERIODS = {2: "record.alternates", 3: "record.in_turn", 5: "record.in_turn"}
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
@@ -59,7 +62,15 @@ def _alternation(record: ImuRecord, quick: Sequence[Any]) -> Array:
 
 def turn_in_turn(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> float:
     """By how much (rad) forces of one in so many rows are turned against the mean; zero where not all of the log shows it."""
-    return _turn(record, _of_channels(record, period, stretches), period, stretches)
+    return _off_the_mean(period) * _turn(record, _of_channels(record, period, stretches), period, stretches)
+
+
+def _off_the_mean(period: int) -> float:
+    """How far one sensor in so many stands from the mean of all, in parts of what it does once in so many rows.
+
+    Turned by an angle, it stands ``(N - 1) / N`` of it from the mean, and does ``2 / N`` of it at each multiple of ``1 / N``.
+    """
+    return max(1.0, 0.5 * (period - 1.0))
 
 
 def _turn(record: ImuRecord, q: Sequence[Any], period: int, stretches: int) -> float:
@@ -87,10 +98,10 @@ def _turn(record: ImuRecord, q: Sequence[Any], period: int, stretches: int) -> f
     return size if size * force > COUNTS * max(_step(x) for x in columns) else 0.0
 
 
-def _of_channels(record: ImuRecord, period: int, stretches: int) -> list[Any]:
-    """What each accelerometer does once in so many rows, as of :func:`_periodic`; nothing of a log that is too short."""
+def _of_channels(record: ImuRecord, period: int, stretches: int, times: int = 1) -> list[Any]:
+    """What each accelerometer does so many times in the period, as of :func:`_periodic`; nothing of a log that is too short."""
     length = _length(record, period, stretches)
-    return [] if length < SHORTEST else [_periodic(x, length, period, stretches) for x in record.accel.T]
+    return [] if length < SHORTEST else [_periodic(x, length, period, stretches, times) for x in record.accel.T]
 
 
 def _length(record: ImuRecord, period: int, stretches: int) -> int:
@@ -98,13 +109,14 @@ def _length(record: ImuRecord, period: int, stretches: int) -> int:
     return (len(record) - 4) // stretches // period * period
 
 
-def _periodic(x: Array, length: int, period: int, stretches: int) -> Any:
-    """(stretches, length / period) size and phase of what a channel does once in so many rows, of two a real number."""
-    quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / (2.0 * math.sin(math.pi / period)) ** 4
+def _periodic(x: Array, length: int, period: int, stretches: int, times: int = 1) -> Any:
+    """(stretches, length / period) size and phase of what a channel does so many times in the period, of two rows a real number."""
+    turn = 2.0 * math.pi * times / period
+    quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / (2.0 * math.sin(0.5 * turn)) ** 4
     rows = quick[: stretches * length].reshape(stretches, length // period, period)
     if period == 2:
         return 0.5 * (rows[:, :, 0] - rows[:, :, 1])
-    return rows @ np.exp(-2j * math.pi / period * np.arange(period)) * (2.0 / period)
+    return rows @ np.exp(-1j * turn * np.arange(period)) * (2.0 / period)
 
 
 def _smooth(x: Array, length: int, period: int, stretches: int) -> Array:
@@ -151,17 +163,27 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
         if turned > 0.0:  # few logs come so far
             turned = min(turned, _turned(record, period, STRETCHES[1]))
         if turned > 0.0:
-            figures: dict[str, Figure] = {"size": turned * GRAVITY_EQUATOR * period / (period - 1.0), "level": turned}
+            size = turned * GRAVITY_EQUATOR * period / (period - 1.0)
+            rows: dict[str, Figure] = {"rows": period} if period > 2 else {}
+            figures: dict[str, Figure] = {"size": size, "level": turned, **rows}
             found.append(Evidence(key, figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",)))
     return found
 
 
 def _turned(record: ImuRecord, period: int, stretches: int) -> float:
-    """By how much (rad) the mean is turned against one in so many rows, by the larger of both figures."""
+    """By how much (rad) the mean is turned against one in so many rows, by the larger of both figures.
+
+    All multiples of the rate of the period up to half the rate of rows must show it.
+    """
     unit = record.interval if record.kind == "increments" else 1.0
-    quick = _of_channels(record, period, stretches)
-    offset = float(np.linalg.norm(_alternation(record, quick)))
-    return max(offset / GRAVITY_EQUATOR / unit, _turn(record, quick, period, stretches))
+    least = math.inf
+    for times in range(1, period // 2 + 1):
+        quick = _of_channels(record, period, stretches, times)
+        offset = float(np.linalg.norm(_alternation(record, quick)))
+        least = min(least, max(offset / GRAVITY_EQUATOR / unit, _turn(record, quick, period, stretches)))
+        if least == 0.0:
+            break
+    return _off_the_mean(period) * least
 
 
 def _step(values: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,9 @@ def largest_nis(rows: int) -> float:
     return max(limit("nis"), chi_square_limit(CHANCE, rows) / rows)
 
 
-def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motion: bool = False) -> list[Evidence]:
+def innovation_evidence(
+    sources: Iterable[Residuals], sigma: Effect, *, by_motion: bool = False, in_sigma: Container[str] = ()
+) -> list[Evidence]:
     """What the innovations of each source say of the model.
 
     Parameters
@@ -44,6 +46,8 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
         Of the answer, one sigma of each output: what grows.
     by_motion : bool
         Whether heading comes from motion alone: velocities in body axes then have no part in it.
+    in_sigma : container of str
+        Sources whose slow errors are in sigma already: their colour is not counted again.
     """
     found: list[Evidence] = []
     sources = [source for source in sources if len(source.time)]
@@ -73,7 +77,8 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
         if nis is not None and nis > largest_nis(int(source.rows[source.used].sum())):
             found.append(contradiction("innovations.size", "specification", name=source.name, factor=math.sqrt(nis)))
         else:
-            found += _growth(source, sigma, by_motion) + led_away_evidence(source)
+            found += [] if source.name in in_sigma else _growth(source, sigma, by_motion)
+            found += led_away_evidence(source)
         if source.outside:
             found.append(note("innovations.outside", name=source.name, outside=source.outside))
     return found

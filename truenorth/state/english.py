@@ -238,7 +238,7 @@ SENTENCES = {
         "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
         "their mean is turned against either by {level:angle}"
     ),
-    "record.in_threes": "every third row of accelerometers differs by {size:.3g} m/s^2: three sensors in turn, {level:angle} apart",
+    "record.in_turn": "one in {rows} rows of accelerometers differs by {size:.3g} m/s^2: sensors in turn, {level:angle} apart",
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
         "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "

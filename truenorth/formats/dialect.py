@@ -1,0 +1,143 @@
+"""The dialect of a table in text: what stands between its columns, and its decimal mark.
+
+It is the one in which most lines of the log's head split into as many numbers. Some loggers write the decimals of one column
+with a point and those of others with a comma (``0.004;-0,08``): then a table has points throughout before it is read, where each
+column keeps to one mark.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from truenorth.core.errors import DataError
+from truenorth.formats.content import REMARKS
+from truenorth.formats.quotes import is_open, plain_cells
+
+NUMBER = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII)
+STAMP = re.compile(
+    r"(?:\d{2,4}[-/.]\d{1,2}[-/.]\d{2,4}[T ]?)?(?:\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?)?(?:Z|[+-]\d\d:?\d\d)?", re.ASCII
+)
+DELIMITERS = (",", ";", "\t", "|", None)  # None: blanks
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+", re.ASCII)
+EITHER = ".,"  # decimal points in some columns, commas in others
+SAMPLE = 40  # lines by which the dialect is judged
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How the lines of a table are cut into cells: `delimiter` (None: blanks) and the `decimal` mark, which may be `EITHER`."""
+
+    delimiter: str | None
+    decimal: str
+
+    def cells(self, line: str) -> list[str]:
+        """The cells of a line, without blanks and quotes around them."""
+        if self.delimiter is None:
+            return [cell.strip('"') for cell in line.split()]
+        if '"' not in line:
+            return [cell.strip() for cell in line.split(self.delimiter)]
+        if is_open(line, self.delimiter):
+            return plain_cells(line, self.delimiter)
+        row = next(csv.reader([line], delimiter=self.delimiter, skipinitialspace=True), [])
+        return [cell.strip().strip('"').strip() for cell in row]
+
+    def is_number(self, cell: str) -> bool:
+        """Whether a cell is a number in this dialect."""
+        if self.decimal == EITHER:
+            cell = cell.replace(",", ".", 1)
+        elif self.decimal == ",":
+            return "." not in cell and NUMBER.fullmatch(cell.replace(",", ".", 1)) is not None
+        return NUMBER.fullmatch(cell) is not None
+
+    def share(self, cells: Sequence[str]) -> float:
+        """Share of cells that are numbers, dates or times; an empty one counts a little less."""
+        if not cells:
+            return 0.0
+        return sum(1.0 if self.is_number(c) or (c and STAMP.fullmatch(c)) else 0.9 * (not c) for c in cells) / len(
+            cells
+        )
+
+    def words(self) -> str:
+        """What it is, for people."""
+        named = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", None: "blanks"}[self.delimiter]
+        return f"{named} between the columns" + (", decimal commas" if self.decimal == "," else "")
+
+
+def dialect_of(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
+    """The dialect of the last lines of the head, and how many cells they have."""
+    lines = [line for _, line in head if not is_remark(line)][-SAMPLE:]
+    lines = lines[:-1] if len(lines) > 2 else lines  # the last one may be cut
+    best, count, highest = Dialect(",", "."), 0, -1.0
+    for decimal in (".", ",", EITHER):
+        for delimiter in DELIMITERS:
+            if delimiter == "," and decimal != ".":
+                continue
+            dialect = Dialect(delimiter, decimal)
+            rows = [dialect.cells(line) for line in lines]
+            size, rows_of_size = Counter(len(row) for row in rows if row).most_common(1)[0] if any(rows) else (0, 0)
+            numbers = [dialect.share(row) for row in rows if len(row) == size]
+            alone = 0.5 if size < 2 else 1.0  # a table has several columns
+            score = alone * rows_of_size / max(1, len(lines)) * (sum(numbers) / max(1, len(numbers)))
+            # Of equals the dialect of more columns: a line of one cell is a number in none or in all of them.
+            if (score, size) > (highest + 1e-9, 0) or (abs(score - highest) <= 1e-9 and size > count):
+                best, count, highest = dialect, size, score
+    return best, count
+
+
+def is_remark(line: str) -> bool:
+    """Whether a line is a remark."""
+    return line.lstrip().startswith(REMARKS)
+
+
+def with_points(source: str, text: bytes, skip: int, names: Sequence[str], dialect: Dialect) -> bytes:
+    """The text with a decimal point in all rows, of a table whose columns have points or commas.
+
+    Parameters
+    ----------
+    source : str
+        The file's name.
+    text : bytes
+    skip : int
+        Lines above the rows.
+    names : sequence of str
+        Of the columns.
+    dialect : Dialect
+
+    Raises
+    ------
+    DataError
+        A column with both marks, or with a mark that may stand between thousands: with line and column.
+    """
+    marks: dict[
+        int, tuple[str, str, int]
+    ] = {}  # of a column: its mark, and the first cell with it, and that cell's line
+    shown: set[int] = set()  # columns whose mark can only be a decimal one
+    lines = text.splitlines(keepends=True)
+    for number, raw in enumerate(lines[skip:], start=skip + 1):
+        line = raw.decode("utf-8", "replace")
+        if is_remark(line):
+            continue
+        for column, cell in enumerate(dialect.cells(line)):
+            mark = next((mark for mark in EITHER if mark in cell), None)
+            if mark is None or column >= len(names) or not dialect.is_number(cell):
+                continue
+            before, first, at = marks.setdefault(column, (mark, cell, number))
+            if before != mark:
+                raise DataError(
+                    f"{source}: line {number}, column {names[column]}: {cell!r}, and {first!r} in line {at}; expected one decimal "
+                    "mark in a column: write all numbers of the log with decimal points"
+                )
+            if THOUSANDS.fullmatch(cell) is None:
+                shown.add(column)
+        lines[number - 1] = raw.replace(b",", b".")
+    for column, (_, cell, number) in marks.items():
+        if column not in shown and len(marks) > 1:
+            raise DataError(
+                f"{source}: line {number}, column {names[column]}: {cell!r} may be a decimal number or one of thousands, as other "
+                "columns have the other mark; expected one decimal mark in the whole log: write all numbers with decimal points"
+            )
+    return b"".join(lines)
