@@ -1,6 +1,5 @@
 """A master whose velocity went through a filter, or whose stamps scatter: found as such, or in sigma."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,7 +51,11 @@ class Tone:
         self.held, self.rng = held, np.random.default_rng(3)
 
     def held_at(self, shift, half):
-        seen = self.size * np.sinc(self.frequency * half / (2.0 * np.pi)) ** 2 * np.cos(self.frequency * (self.held + shift))
+        seen = (
+            self.size
+            * np.sinc(self.frequency * half / (2.0 * np.pi)) ** 2
+            * np.cos(self.frequency * (self.held + shift))
+        )
         noise = self.noise * np.sqrt(2.0 / (3.0 * half)) * self.rng.standard_normal((3, len(seen)))
         return np.stack([seen, 0.0 * seen, 0.0 * seen], axis=1) + noise.T
 
@@ -62,7 +65,11 @@ def columns_of(monkeypatch, found, push, **of_motion):
     monkeypatch.setattr(transfer_smoothed, "Means", type("Motion", (Tone,), of_motion))
     model = TransferModel(accel_random_walk=push, filter=filter_sigmas(0.15, True))
     own = model.slice_of(FILTER)
-    sensors, P, held = np.zeros((4000, model.states)), np.zeros((4000, model.states, model.states)), np.arange(4000) * 0.05
+    sensors, P, held = (
+        np.zeros((4000, model.states)),
+        np.zeros((4000, model.states, model.states)),
+        np.arange(4000) * 0.05,
+    )
     sensors[-1, own] = found
     track = Track(held, held, held, held, sensors, P, model.layout, ())
     slave = SimpleNamespace(interval=0.01)
