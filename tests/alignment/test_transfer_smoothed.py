@@ -1,6 +1,5 @@
 """A master whose velocity went through a filter, or whose stamps scatter: found as such, or in sigma."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,50 +7,97 @@ import pytest
 
 from benchmarks.honesty.transfer import ERRORS, aircraft, transferred
 from tests.alignment.test_transfer_axes import ARM, ship
-from truenorth.alignment import transfer_verdict
+from truenorth.alignment import transfer_smoothed, transfer_verdict
 from truenorth.alignment.transfer_filter import Assumed, Linear, Matching, master_aiding
-from truenorth.alignment.transfer_smoothed import filter_sigmas
-from truenorth.core.attitude import skew
+from truenorth.alignment.transfer_smoothed import filter_sigmas, flatter_along
 from truenorth.core.errors import UsageError
 from truenorth.errors.master import DELAY, FILTER, MasterErrors, TransferModel, master_errors
 from truenorth.estimate.linear import rows_along
 from truenorth.records import MasterRecord
 from truenorth.simulation.gnss import place_of
+from truenorth.state.track import Track
 
 AT, STEP = np.array([41.3, 42.3]), 0.02  # s
 
 
 def test_what_a_filter_does_to_a_velocity_is_its_columns():
-    """Late, flatter where the acceleration changes, and skewed: derivatives of the velocity of the master, on an arm of a ship."""
-    way = ship(np.random.default_rng(1), 60.0)
+    """Late, flatter where the acceleration changes, and skewed: what the row shows of a master on an arm of a ship is H x."""
+    way, late, flat, skewed = ship(np.random.default_rng(1), 60.0), 0.1, 0.006, 0.0004
     model = TransferModel(filter=filter_sigmas(0.15, True))
     at = way.states(AT)
-    v = np.stack([place_of(way.states(AT + k * STEP), -ARM)[3] for k in (-2, -1, 0, 1, 2)])
-    jerk, change = (v[3] - 2.0 * v[2] + v[1]) / STEP**2, (v[4] - 2.0 * v[3] + 2.0 * v[1] - v[0]) / (2.0 * STEP**3)
-    turned = np.einsum("kij,kj->ki", at.C_nb, np.cross(at.w_ib_b, at.f_b))
-    flatter = np.column_stack([at.f_b, jerk - turned, change])
-    linear = Linear(at.C_nb, at.C_nb, flatter=flatter)
-    master = MasterRecord(AT, C_nb=at.C_nb, v_n=v[2], source="made")
-    found = master_aiding(master, model, Assumed(ARM), Matching(1.0), linear)
-    H = rows_along(at, found, model.ins)[1]
+    then = [place_of(way.states(AT - late + k * STEP), -ARM)[3] for k in (-2, -1, 0, 1, 2)]
+    now = place_of(at, -ARM)[3]
+    jerk = (then[3] - 2.0 * then[2] + then[1]) / STEP**2
+    change = (then[4] - 2.0 * then[3] + 2.0 * then[1] - then[0]) / (2.0 * STEP**3)
+    linear = Linear(at.C_nb, at.C_nb, flatter=np.column_stack([now - then[2], jerk, change, np.full(2, late)]))
+    seen = then[2] + flat * jerk - skewed * change
+    master = MasterRecord(AT, C_nb=at.C_nb, v_n=seen, source="made")
+    z, H = rows_along(at, master_aiding(master, model, Assumed(ARM), Matching(1.0), linear), model.ins)
     own = model.slice_of(FILTER)
     np.testing.assert_array_equal(H[:, :3, own.start], H[:, :3, model.slice_of(DELAY).start])
-    np.testing.assert_allclose(H[:, :3, own.start + 1], -jerk, atol=2e-3)  # but for the turning of the earth
+    np.testing.assert_allclose(H[:, :3, own.start + 1], -jerk, atol=1e-9)
     np.testing.assert_allclose(H[:, :3, own.start + 2], change, atol=1e-9)
+    np.testing.assert_allclose(z[:, :3], H[:, :3, own] @ [late, flat, skewed], atol=1e-4)  # the turning of the earth
+    assert np.abs(flat * jerk).max() > 1e-3
 
 
-def test_noise_of_a_rate_parts_no_flatter_velocity_from_an_arm():
-    """A force that turns with the body is an arm along it, whatever the gyros say: both columns are of one rate."""
-    way = ship(np.random.default_rng(1), 60.0)
-    at = way.states(AT)
-    noisy = replace(at, w_ib_b=at.w_ib_b + 0.3)
-    linear = Linear(at.C_nb, at.C_nb, flatter=np.column_stack([at.f_b, np.zeros((2, 6))]))
-    master = MasterRecord(AT, C_nb=at.C_nb, v_n=at.v_n, source="made")
-    model = TransferModel(filter=filter_sigmas(0.15, False))
-    H = rows_along(noisy, master_aiding(master, model, Assumed(ARM), Matching(1.0), linear), model.ins)[1]
-    arm, flat = model.slice_of("master lever arm"), model.slice_of(FILTER).start + 1
-    np.testing.assert_allclose(H[:, :3, flat], -np.einsum("kij,kj->ki", H[:, :3, arm], at.f_b), atol=1e-12)
-    assert np.abs(H[:, :3, flat] - -np.einsum("kij,kj->ki", at.C_nb @ skew(at.w_ib_b), at.f_b)).max() > 0.1
+class Tone:
+    """In place of `Means`: the acceleration ``cos(w t)`` east, as triangles of a half length show it, and noise."""
+
+    frequency, size, noise = 6.0, 1.0, 0.0  # rad/s, m/s^2
+    corrections = np.zeros(3)
+
+    def __init__(self, slave, track, carried, held, arm):
+        self.held, self.rng = held, np.random.default_rng(3)
+
+    def held_at(self, shift, half):
+        seen = (
+            self.size
+            * np.sinc(self.frequency * half / (2.0 * np.pi)) ** 2
+            * np.cos(self.frequency * (self.held + shift))
+        )
+        noise = self.noise * np.sqrt(2.0 / (3.0 * half)) * self.rng.standard_normal((3, len(seen)))
+        return np.stack([seen, 0.0 * seen, 0.0 * seen], axis=1) + noise.T
+
+
+def columns_of(monkeypatch, found, push, **of_motion):
+    """Of a motion in place of the real one, with what a pass has found of the filter; push: density of the force's noise."""
+    monkeypatch.setattr(transfer_smoothed, "Means", type("Motion", (Tone,), of_motion))
+    model = TransferModel(accel_random_walk=push, filter=filter_sigmas(0.15, True))
+    own = model.slice_of(FILTER)
+    sensors, P, held = (
+        np.zeros((4000, model.states)),
+        np.zeros((4000, model.states, model.states)),
+        np.arange(4000) * 0.05,
+    )
+    sensors[-1, own] = found
+    track = Track(held, held, held, held, sensors, P, model.layout, ())
+    slave = SimpleNamespace(interval=0.01)
+    return held, flatter_along(slave, track, None, model, held, np.zeros(3), 0.05)
+
+
+@pytest.mark.parametrize("constant", [0.05, 0.1])
+def test_columns_find_a_filter_of_the_first_order(monkeypatch, constant):
+    """Of 1 m/s^2 at 6 rad/s, and nothing is left for an arm: the next two terms of the filter are those of the means."""
+    w = Tone.frequency
+    held, flatter = columns_of(monkeypatch, [constant, constant**2 / 2.0, constant**3 / 3.0], 0.0)
+    true = np.real(np.exp(1j * w * held) / (1j * w * (1.0 + 1j * w * constant)))
+    led_back, jerk, change = (flatter[10:-10, k] for k in (0, 3, 6))
+    columns = np.column_stack([jerk, -change])
+    found, *_ = np.linalg.lstsq(columns, (true - np.sin(w * held) / w)[10:-10] + led_back)
+    # The next term but these, (w T)^6, and what the means of the way back leave out, a third derivative.
+    assert found[0] == pytest.approx(constant**2 / 2.0, rel=0.01 + 0.4 * (w * constant) ** 4)
+    assert found[1] == pytest.approx(constant**3 / 3.0, abs=constant * 0.05**2 / 12.0 + 0.4 * w**2 * constant**5)
+
+
+def test_columns_are_of_the_motion_and_not_of_the_noise(monkeypatch):
+    """What the filter has found chooses the means; noise makes them longer, or the columns nothing where there is no motion."""
+    sound = columns_of(monkeypatch, [0.1, 0.005, 3e-4], 0.0)[1]
+    noisy = columns_of(monkeypatch, [0.1, 0.005, 3e-4], 2e-3, noise=2e-3)[1]
+    assert np.sum(noisy[:, 3] * sound[:, 3]) / np.sum(sound[:, 3] ** 2) == pytest.approx(1.0, abs=0.02)
+    still = columns_of(monkeypatch, [0.1, 0.005, 3e-4], 2e-3, noise=2e-3, size=0.0)[1]
+    known = np.sum(still[:, 3:6] ** 2) * (0.15**2 / np.sqrt(2.0) / 0.05) ** 2
+    assert known < 0.05
 
 
 def test_a_filter_is_said_by_its_time_constant():
@@ -60,6 +106,7 @@ def test_a_filter_is_said_by_its_time_constant():
     assert FILTER not in TransferModel(filter=filter_sigmas(0.0, True)).groups
     late, flat, skewed = filter_sigmas(0.1, False)
     assert late == 0.0  # by velocity alone it is a delay of the master
+    assert filter_sigmas(0.1, True) == (0.1, flat, skewed)
     # What a time constant of one or two sigmas does lies within two of theirs.
     assert 0.1**2 / 2.0 < flat < 0.2**2 / 2.0 < 3.0 * flat
     assert 0.1**3 / 3.0 < skewed < 0.2**3 / 3.0 < 3.0 * skewed

@@ -164,7 +164,6 @@ class Means:
         middle = 0.5 * (self.C[1:] + self.C[:-1])
         velocity = _summed((middle @ _forces(slave, track, steps)[..., None])[..., 0])
         self.turned = _summed(middle * steps[:, None, None])
-        self.attitudes = _summed(0.5 * (self.turned[1:] + self.turned[:-1]) * steps[:, None, None])
         self.moved = _summed(0.5 * (velocity[1:] + velocity[:-1]) * steps[:, None])
         row = np.clip(np.searchsorted(track.time, held), 0, len(track) - 1)
         lat, alt, v = track.position[row, 0], track.position[row, 2], track.v_n[row]
@@ -184,12 +183,12 @@ class Means:
         common = common / (1.0 - common)
         return push, np.concatenate([push[..., None], of_arm], axis=2), common
 
-    def held_at(self, shift: float, half: float) -> tuple[Array, Array]:
-        """The master's specific force (M, 3) and the attitude (M, 3, 3), n, so long after its rows, means; NaN beyond the log."""
+    def held_at(self, shift: float, half: float) -> Array:
+        """(M, 3) the master's specific force so long after its rows, n, means; NaN beyond the log."""
         there = self.held + shift
         span = np.where((there - half >= self.knots[0]) & (there + half <= self.knots[-1]), half, np.nan)
         force = self._slope(self.moved, span, shift) - self._slope(self.C, span, shift) @ self.arm
-        return (self.into_n @ force[..., None])[..., 0], self.into_n @ self._slope(self.attitudes, span, shift)
+        return np.asarray((self.into_n @ force[..., None])[..., 0])
 
     def _slope(self, whole: Array, span: Array, after: float = 0.0) -> Array:
         """Mean slope, so long after the rows, of what this is the integral of, by a triangle's weights: a second difference."""

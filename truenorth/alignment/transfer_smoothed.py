@@ -5,30 +5,33 @@ first terms of a motion are, with dots for derivatives,
 
     v_filtered(t) = v(t - lambda) + chi v.. - kappa v... + ..
 
-of one of the first order ``lambda = T``, ``chi = T^2 / 2``, ``kappa = T^3 / 3`` (with `lambda` taken to the first power alone, by
-attitude and velocity, ``T^2`` and ``T^3``). `lambda` is a delay, the others are none. An aircraft that rolls into a coordinated
-turn at a rate `p` has ``v.. = g p`` across: an arm ``g chi`` up, 5 cm of a filter of .1 s, up to 7 of its sigmas. What begins
-and ends such a roll is ``v...``, which drew delay and arm forward along each other.
+of one of the first order ``lambda = T``, ``chi = T^2 / 2``, ``kappa = T^3 / 3``. `lambda` is a delay, the others are none. An
+aircraft that rolls into a coordinated turn at a rate `p` has ``v.. = g p`` across: an arm ``g chi`` up, 5 cm of a filter of .1 s.
+What begins and ends such a roll is ``v...``, which drew delay and arm forward along each other. So all are taken where they hold,
+at ``t - lambda`` as found by the pass before: a line from `t` is 1 cm/s off after .1 s of such a roll.
 
-The slave's noise must not part arm and `chi`. So with the master's specific force `f`, a mean,
+Derivatives are those of the master's specific force `f`, n: means over `b` about ``t + h`` less those about ``t - h``, with
+``b = h / 2``, and the second difference of such means. Such a mean holds derivatives of two orders more,
 
-    v.. = C (w x f) + C f.,        C (w x f) = (column of the arm) f
+    chi (v.. + .1875 h^2 v....) - kappa (v... + .1042 h^2 v.....)
 
-and only what the body's turning does not make, ``C f.``, is taken from means: those over `b` about ``t + h`` less those about
-``t - h``, with ``b = h / 2``, which hold nothing of the noise at the row itself. Of densities `q` and `walk` of the sensors' noise
+which a filter does, too: of one of the first order the next two terms are those of ``h = 2 T`` and ``h = 3.25 T``. Longer
+means make a motion smaller than it is (a roll in 2 s with `h` of .4 s: to two thirds), and what they leave out is taken for an
+arm. So `h` is that of the filter as found, and longer only where the sensors' noise, of densities `q` and `walk`,
 
     N_chi = K (2 q^2 / h^3 + 16 |r|^2 walk^2 / h^5) / sigma^2,    N_kappa = K (24 q^2 / h^5 + 192 |r|^2 walk^2 / h^7) / sigma^2
 
-over K rows of noise `sigma` would be taken for knowledge (of ``v...``, a second difference of such means): `h` is the shortest with
-which that is little against what is known of them.
+over K rows of noise `sigma`, is not little both against what was known before and against what the column knows, G. The column is
+then what is expected of it, ``1 - N / G`` of it (as in :mod:`truenorth.alignment.transfer_columns`).
 
 Sources: moments of an impulse response, A. Papoulis, "The Fourier integral and its applications" (1962), chapter 7; the
-rule is ours.
+rules are ours.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +46,18 @@ from truenorth.state.track import Track
 Array = NDArray[np.float64]
 
 FALSE = 0.5  # of what is known before: so much more a column of noise may be thought to show
+SHARE = 0.02  # of what a column knows, that may be noise where that is more
+FLAT, SKEWED = 2.0, 3.25  # time constants of a filter of the first order whose next terms these means have
+LONGEST = 0.2  # s: of the time constant by which the means are chosen
+QUIET = 0.3  # of the noise of a row: what is led back to an earlier moment may have
 
 
 def flatter_along(
     slave: ImuRecord, track: Track, carried: Carried, model: TransferModel, held: Array, lever_arm: Array, sigma: float
 ) -> Array | None:
-    """(M, 9) the master's specific force, body axes, m/s^2; ``C f.``, m/s^3, and ``v...``, m/s^4, n; NaN near the ends of a log.
+    """(M, 10) what velocity changes in `lambda`, m/s; ``v..``, m/s^3, and ``v...``, m/s^4, of then, n; `lambda`, s.
 
-    None where its velocity is taken as it is.
+    NaN near the ends of a log; None where its velocity is taken as it is.
 
     Parameters
     ----------
@@ -69,25 +76,44 @@ def flatter_along(
     P, at = track.P[-1], track.layout.slice_of(ARM)
     arm = lever_arm + (0.0 if at is None else track.sensors[-1, at])
     reach = float(arm @ arm) + (0.0 if at is None else float(np.trace(P[at, at])))
+    late, flat, _ = (float(x) for x in track.sensors[-1, own])
+    constant = min(math.sqrt(2.0 * max(flat, 0.0)), LONGEST)
     means, walk, push = Means(slave, track, carried, held, arm), model.gyro_random_walk, model.accel_random_walk
+    lengths = [h for h in HALVES if h > 2.0 * slave.interval]
 
-    def short(known: float, of_push: int, of_walk: int, order: int) -> float:
-        """The shortest h with which noise is little against what is known, its variance ``of q^2 / h^order + ..``."""
-        for h in HALVES:
-            variance = of_push * push**2 / h**order + of_walk * reach * walk**2 / h ** (order + 2)
-            if 0.5 * h > 2.0 * slave.interval and len(track) * (known / sigma) ** 2 * variance < FALSE:
-                return h
-        return HALVES[-1]
+    def shown(ideal: float, known: float, derivative: Callable[[float], Array], noise: tuple[int, int, int]) -> Array:
+        """(M, 3) a derivative by the shortest means whose noise is little, and what of it is no noise."""
+        of_push, of_walk, order = noise
+        shortest = max(ideal, 2.0 * lengths[0])
+        column = np.zeros((len(held), 3))
+        for h in (shortest, *(h for h in lengths if h > shortest)):
+            column = derivative(h)
+            there = np.isfinite(column).all(axis=1)
+            each = of_push * push**2 / h**order + of_walk * reach * walk**2 / h ** (order + 2)
+            N, G = (known / sigma) ** 2 * np.array([len(track) * each, np.sum(column[there] ** 2)])
+            column = column * max(0.0, 1.0 - N / max(G, 1e-300))
+            if max(FALSE, SHARE * G) > N:
+                break
+        return column
 
-    _, flat, skew = model.filter
-    h = short(flat, 2, 16, 3)
-    (late, C_late), (now, C), (early, C_early) = (means.held_at(shift, 0.5 * h) for shift in (h, 0.0, -h))
-    f = np.einsum("kji,kj->ki", C, now)
-    turned = np.einsum("kij,kj->ki", C_late - C_early, f)
-    changed = (late - early - turned) / (2.0 * h)
-    h = short(skew, 24, 192, 5)
-    late, now, early = (means.held_at(shift, 0.5 * h)[0] for shift in (h, 0.0, -h))
-    return np.column_stack([f, changed, (late - 2.0 * now + early) / h**2])
+    def first(h: float) -> Array:
+        after, before = (means.held_at(shift - late, 0.5 * h) for shift in (h, -h))
+        return np.asarray((after - before) / (2.0 * h))
+
+    def second(h: float) -> Array:
+        after, now, before = (means.held_at(shift - late, 0.5 * h) for shift in (h, 0.0, -h))
+        return np.asarray((after - 2.0 * now + before) / h**2)
+
+    _, flat_sigma, skew_sigma = model.filter
+    changes = (
+        shown(FLAT * constant, flat_sigma, first, (2, 16, 3)),
+        shown(SKEWED * constant, skew_sigma, second, (24, 192, 5)),
+    )
+    half = next((b for b in lengths if late**2 * reach * 2.0 * walk**2 / b**3 < (QUIET * sigma) ** 2), lengths[-1])
+    # Simpson's rule over the acceleration on the way.
+    now, middle, then = (means.held_at(-part * late, half) for part in (0.0, 0.5, 1.0))
+    led_back = late * ((now + 4.0 * middle + then) / 6.0 + means.corrections)
+    return np.column_stack([led_back, *changes, np.full(len(held), late)])
 
 
 def filter_sigmas(constant: float, attitude: bool) -> tuple[float, float, float]:
@@ -95,4 +121,4 @@ def filter_sigmas(constant: float, attitude: bool) -> tuple[float, float, float]
 
     By velocity alone (no `attitude`) its mean delay is one of the master.
     """
-    return (constant, constant**2, 3.0 * constant**3) if attitude else (0.0, math.sqrt(0.5) * constant**2, constant**3)
+    return (constant if attitude else 0.0, math.sqrt(0.5) * constant**2, constant**3)
