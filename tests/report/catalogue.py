@@ -24,8 +24,8 @@ HOME = Path(truenorth.__file__).parent
 # Arrays and models of one's own code: their messages are for those who write Python, and stay English.
 NOT_SPOKEN = ("filters", "analysis")
 RAISED = re.compile(
-    r"(?!CannotLink|Import)\w*Error|Finding|_missing|_damaged"
-)  # those two are caught, and a kernel left to Numba
+    r"(?!CannotLink|Import|UnknownValue)\w*Error|Finding|_missing|_damaged"
+)  # those are caught: a kernel left to Numba
 METHODS = [
     ("report/**.py", "python"),
     ("cli/**.py", "python"),
