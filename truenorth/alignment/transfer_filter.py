@@ -92,9 +92,7 @@ class Linear:
     columns: Columns | None = None  # of delay and arm in an open loop; those of the instant where None
     scatter: Mapping[str, float] = field(default_factory=dict)  # s: one sigma of stamps, by the name of their rows
     scattered: Mapping[str, Array] = field(default_factory=dict)  # (M, 3) what that adds to sigmas
-    flatter: Array | None = (
-        None  # (M, 10) what a filter of the master's velocity makes late and flatter, where there may be one
-    )
+    flatter: Array | None = None  # (M, 10) what a filter of the master's velocity makes late and flatter
 
 
 class MasterRows(NamedTuple):
