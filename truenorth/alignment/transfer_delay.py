@@ -79,6 +79,19 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored:
     return Found(float(offset - step * (shifts[k] + fraction)), peak, rival, sure, gain, shared)
 
 
+def likeliest_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> float:
+    """Delay (s) at which agreement and what both logs have in common make the likeliest of all; NaN where they are too short.
+
+    Where a manoeuvre lies upon the next one logs agree as well as where all lie upon themselves, but have less in common.
+    """
+    both = _compared(slave, master, C_mb)
+    if both is None:
+        return math.nan
+    _, step, _, _, shifts, score, common = both
+    k = int(np.argmin(common * np.log(np.maximum(1.0 - np.maximum(score, 0.0) ** 2, 1e-12))))
+    return float(master.time[0] - slave.time[0] - step * shifts[k])
+
+
 def agreement(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> float:
     """Correlation of both logs' motion where the master is late by this delay, s; -1 where they have nothing in common there."""
     both = _compared(slave, master, C_mb)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.transfer_delay import WINDOW, agreement, find_delay, runs_backwards
+from truenorth.alignment.transfer_delay import WINDOW, agreement, find_delay, likeliest_delay, runs_backwards
 from truenorth.alignment.transfer_filter import Assumed
 from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR, radii
@@ -78,8 +78,7 @@ def _fits(slave: ImuRecord, master: MasterRecord, assumed: Assumed, best: float)
 
     Manoeuvres that come again agree as well with the next ones, and stamps that scatter make it a matter of chance where best.
     """
-    said = max(agreement(slave, master, assumed.C_mb, assumed.delay), 0.0)
-    return 1.0 - said**2 < MISFIT * (1.0 - best**2)
+    return _left(slave, master, assumed.C_mb, assumed.delay) < MISFIT * (1.0 - best**2)
 
 
 def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> Evidence | None:
@@ -96,15 +95,16 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: fl
     if first < 2:
         return None
     # Half a window: where the agreement is just sure, a delay is found to a tenth of it.
-    least = max(0.5 * WINDOW["rate" if master.C_nb is not None else "force"], master.interval)
+    shortest = max(0.5 * WINDOW["rate" if master.C_nb is not None else "force"], master.interval)
     parts = master[:first], master[last:]
     begin, end = (find_delay(slave, part, C_mb) for part in parts)
-    if not (begin.sure and end.sure) or abs(end.delay - begin.delay) < least:
+    if not (begin.sure and end.sure) or abs(end.delay - begin.delay) < shortest:
         return None
-    # What comes again and again, such as a sea or a rotor, agrees at many delays: one that fits both parts is that of the clock.
-    for part, own, other in zip(parts, (begin, end), (end, begin), strict=True):
-        own_left, left = (1.0 - max(agreement(slave, part, C_mb, x.delay), 0.0) ** 2 for x in (own, other))
-        if left < MISFIT * own_left:
+    # What comes again and again, such as a sea or a rotor, agrees at many delays, and chance says which is best: one that fits
+    # both parts is that of the clock.
+    own = [_left(slave, part, C_mb, found.delay) for part, found in zip(parts, (begin, end), strict=True)]
+    for one in (begin.delay, end.delay, likeliest_delay(slave, master, C_mb)):
+        if all(_left(slave, part, C_mb, one) < MISFIT * least for part, least in zip(parts, own, strict=True)):
             return None
     return contradiction(
         "transfer.clocks_part",
@@ -115,6 +115,11 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: fl
         after=end.delay,
         since=float(master.time[last]),
     )
+
+
+def _left(slave: ImuRecord, part: MasterRecord, C_mb: Array, delay: float) -> float:
+    """Share of a part's motion that its agreement at a delay leaves."""
+    return 1.0 - max(agreement(slave, part, C_mb, delay), 0.0) ** 2
 
 
 def model_from_spec(

@@ -42,12 +42,12 @@ def judge_transfer(
     evidence = list(of_master)
     evidence += _rejected(transfer)
     evidence += _misses(transfer, track, assumed)
-    evidence += _filtered(track)
     lopsided = _lopsided(track, transfer)
     evidence += [] if lopsided else _lasting(transfer, least)
     if lopsided:
         remedies = ("slave_specification", "without_jump") if transfer.jumps else ("slave_specification",)
         evidence.append(contradiction("transfer.lopsided", *remedies, rows=lopsided, imu=answer.imu_source))
+    evidence += _filtered(track)  # last: an IMU that is poorer than it is said to be may look like one
     evidence += notes(transfer.notes) + notes(transfer.jumps[:MOST_JUMPS])
     if len(transfer.jumps) > MOST_JUMPS:  # a master that is reset now and then does not do that
         evidence.append(

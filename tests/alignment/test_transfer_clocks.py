@@ -1,0 +1,45 @@
+"""Clocks of a slave and its master where one manoeuvre looks like the next: chance says which of them agree best."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truenorth.alignment.transfer_delay import likeliest_delay
+from truenorth.alignment.transfer_start import parted_clocks
+from truenorth.core.position import Position
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import MasterSpec, simulate, simulate_sensor
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import s_turn, straight
+
+DEG = np.radians(1.0)
+LATE = 0.03  # s
+
+
+@pytest.fixture(scope="module", params=range(2))
+def logs(request):
+    """An aircraft with two S-turns alike, and a master that puts each row of ten a second out five times."""
+    legs = [*straight(30.0), *s_turn(20 * DEG, 3 * DEG), *straight(60.0), *s_turn(20 * DEG, 3 * DEG), *straight(200.0)]
+    way = course(Position.from_degrees(62.0, 20.0, 3000.0), legs, heading=0.6, speed=150.0)
+    seeds = {"seed": 90889, "run": request.param}
+    slave = simulate(way, rate=100.0, duration=200.0, imu=imu_spec("tactical"), **seeds).record
+    of_master = MasterSpec(clock_offset=LATE, velocity_noise=0.05, attitude_noise=DEG / 60.0)
+    master = simulate_sensor(way, of_master, duration=200.0, **seeds).record
+    time = np.arange(master.time[0], master.time[-1], 0.02)
+    held = np.searchsorted(master.time, time + 1e-9) - 1
+    named = {name: getattr(master, name)[held] for name in ("lat", "lon", "alt", "v_n", "C_nb")}
+    return slave, replace(master, time=time, **named)
+
+
+def test_a_turn_that_comes_again_is_no_other_clock(logs):
+    slave, master = logs
+    assert parted_clocks(slave, master, np.eye(3), 0.0) is None
+    found = likeliest_delay(slave, master, np.eye(3))
+    assert abs(found - LATE - 0.05) < 0.03  # a row that is held is later by half of its time
+
+
+def test_a_clock_that_steps_between_them_is_named(logs):
+    slave, master = logs
+    stepped = replace(master, time=master.time + 3.0 * (master.time > 100.0))
+    assert parted_clocks(slave, stepped, np.eye(3), 0.0) is not None
