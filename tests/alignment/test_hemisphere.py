@@ -1,6 +1,7 @@
 """A latitude of the wrong sign: gravity bends the other way, which a base that sways does not hide."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from tests.alignment.test_bias_step import PLACE, ship
 from tests.runs import some
 from truenorth.alignment import align, rotary
+from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.position import Position
 from truenorth.state.limits import limit
@@ -25,6 +27,15 @@ def test_the_other_hemisphere_is_named_and_the_right_one_is_not(bench, run):
     assert wrong.status == "inconsistent"
     assert any("other hemisphere" in reason for reason in wrong.reasons)
     assert not any("other hemisphere" in reason for reason in sound.reasons)
+
+
+def test_aligning_anew_is_asked_where_the_bend_can_be_seen():
+    """Fits of a motion end some tens short of the likeliest: 85 where a third of a sigma of the bend is seen says nothing."""
+    place, fine = Position.from_degrees(46.5, 10.0), SimpleNamespace(form="velocity")
+    for ratio, size, asked in ((0.9, 2.56, False), (10.0, 0.7, True)):
+        match = SimpleNamespace(ratio=[ratio], size=[size])
+        found = hemisphere_evidence(match, fine, place, lambda where: 85.0 * (where.lat > 0.0))
+        assert [item.key for item in found] == ["place.hemisphere"] * asked
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,9 @@ which the log is likeliest there, and what is usual of it counts as in the infer
 Where a base sways, the fit of its motion may take up a part of that bend as a slow oscillator: of one indexer the ratio was 10,
 with a size of .7. So a log that is likelier in the other hemisphere, but no more than chance would have it, is aligned anew in
 both, the motion fitted in each. That shows more than the bend: a base moves along east and north, which turn in the inertial frame
-the other way round (the likelihoods of that indexer differ by 45).
+the other way round (the likelihoods of that indexer differ by 45). But each fit may end some tens short of the likeliest motion:
+two sound logs of tactical IMUs on a buoy and a raft, which show nothing of the bend (a third of a sigma), were likelier elsewhere
+by 85 and 74. So the bend must be visible, if all of it were there.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
+SEEN = 9.0  # of the bend, in its sigmas, squared: what shows less of it has nothing for a fit to take up
 WALKS = np.log(2.0) * np.arange(6)  # logarithms of gyros' random walks in the inferred one
 
 
@@ -84,7 +87,7 @@ def hemisphere_evidence(
     if better > sure and not given:
         off = hemisphere_signature(fine, position).measured_course[..., 0]
         better = min(better, _of_any_noise(fine, fine.system.z) - _of_any_noise(fine, fine.system.z - off))
-    elif 0.0 < better <= sure and given and elsewhere is not None:
+    elif 0.0 < better <= sure and ratio > SEEN * size**2 and given and elsewhere is not None:
         better = elsewhere(position) - elsewhere(replace(position, lat=-position.lat))
         sure = limit("hemisphere refitted")
     if better > sure:
