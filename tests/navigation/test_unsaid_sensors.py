@@ -4,7 +4,7 @@ import numpy as np
 
 from tests.helpers import start_before
 from tests.navigation.test_navigate import SPEC, drive, fixes
-from truenorth.aiding.aids import WHEEL, Gnss, Odometer
+from truenorth.aiding.aids import Gnss, Odometer
 from truenorth.core.attitude import misalignment
 from truenorth.navigation import navigate
 from truenorth.records.specs import imu_spec
@@ -29,10 +29,10 @@ def test_a_late_receiver(drive):
 
 
 def van(scale):
-    """A van of two minutes whose wheel counts wrong by `scale` and sits askew by two degrees: log, wheel and truth."""
+    """A van whose wheel counts wrong by `scale` and sits askew by two degrees: log, wheel and truth."""
     wheel = {"rate": "10 Hz", "output": "speed", "noise": "0.02 m/s", "scale": scale, "mounting": ["2 deg", "-1 deg"]}
     shipped = read_scenario("van").to_mapping()
-    scenario = read_scenario({**shipped, "duration": "120 s", "imu": "tactical", "odometer": wheel})
+    scenario = read_scenario({**shipped, "duration": "80 s", "imu": "tactical", "odometer": wheel})
     simulation = scenario.simulate(seed=5)
     return simulation, scenario.simulate_aiding(seed=5)["odometer"].record
 
@@ -44,14 +44,14 @@ def test_its_scale_and_its_seat_are_estimated():
     place = (truth.lat[0], truth.lon[0], truth.alt[0])
     biases = (simulation.errors.gyro_bias, simulation.errors.accel_bias)
     start = start_before(record, truth.C_nb[0], truth.v_n[0], place, biases, sigma)
-    unsaid = navigate(record, start, aid=Odometer(wheel), imu=spec)
+    unsaid = navigate(record, start, aid=Odometer(wheel), imu=spec, check_clocks=False)
     assert unsaid.status == "navigated", unsaid.reasons
     assert abs(unsaid.estimated()["odometer scale"]["value"][0] - 0.02) < 0.005
     end = np.searchsorted(truth.time, unsaid.track.time[-1] - 1e-6)
     at_end = unsaid.track.sigma[-1]
     assert np.abs(misalignment(unsaid.track.C_nb[-1], truth.C_nb[end]) / at_end[:3]).max() < 4.0
     assert np.abs((unsaid.track.v_n[-1] - truth.v_n[end]) / at_end[DV]).max() < 4.0
-    same = navigate(record, start, aid=Odometer(wheel, WHEEL), imu=spec)
-    np.testing.assert_array_equal(same.track.v_n, unsaid.track.v_n)
-    exact = navigate(record, start, aid=Odometer(wheel, Mounting()), imu=spec)  # said to be known, and is not
+    exact = navigate(
+        record, start, aid=Odometer(wheel, Mounting()), imu=spec, check_clocks=False
+    )  # said so, and is not
     assert exact.status == "inconsistent"
