@@ -133,25 +133,20 @@ def test_a_column_with_decimal_points_among_columns_with_commas(tmp_path, marks)
     np.testing.assert_allclose(record.accel, accel, atol=1e-7)
 
 
-def test_both_decimal_marks_in_one_column_are_refused_by_line_and_column(tmp_path):
-    path = toolbox(tmp_path / "log.csv", ".,,,,,,")
+@pytest.mark.parametrize(
+    ("marks", "changed", "words"),
+    [
+        (".,,,,,,", 3, r"log.csv: line 501, column gFx: .*in line 2; expected one decimal mark in a column: write"),
+        (",,,,,,,", 2, r"line 501, column gFx: .*a decimal comma, as in most rows: write all with one mark"),
+    ],
+    ids=["in a table of both marks", "in a table of commas"],
+)
+def test_another_decimal_mark_in_one_row_is_refused_by_line_and_column(tmp_path, marks, changed, words):
+    path = toolbox(tmp_path / "log.csv", marks)
     lines = path.read_text().splitlines()
-    lines[500] = lines[500].replace(",", ".", 3)
+    lines[500] = lines[500].replace(",", ".", changed)
     path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(
-        DataError, match=r"log.csv: line 501, column gFx: .*in line 2; expected one decimal mark in a column: write"
-    ):
-        read_imu(path)
-
-
-def test_a_number_with_the_other_decimal_mark_says_so(tmp_path):
-    path = toolbox(tmp_path / "log.csv", ",,,,,,,"[:7])
-    lines = path.read_text().splitlines()
-    lines[500] = lines[500].replace(",", ".", 2)
-    path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(
-        DataError, match=r"line 501, column gFx: .*a decimal comma, as in most rows: write all with one mark"
-    ):
+    with pytest.raises(DataError, match=words):
         read_imu(path)
 
 

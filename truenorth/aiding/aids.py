@@ -58,10 +58,11 @@ class Aid(Protocol):
 
 @dataclass(frozen=True)
 class _Mounted:
-    """An aid with a mounting; None: the usual one of the procedure."""
+    """An aid with a mounting; None: the usual one of its kind, or of the procedure."""
 
     record: Any
     mounting: Mounting | None = None
+    usual: ClassVar[Mounting] = Mounting()
 
     def mounted(self, mounting: Mounting) -> Self:
         """The same aid, mounted so."""
@@ -82,10 +83,11 @@ class Gnss(_Mounted):
 
     record: GnssRecord
     key: ClassVar[str] = "gnss"
+    usual: ClassVar[Mounting] = ANTENNA
 
     def sources(self, altitude: str) -> list[Aiding]:
         """Positions and velocities."""
-        return from_gnss(self.record, self.mounting or ANTENNA, heights=altitude in ("gnss", "free"))
+        return from_gnss(self.record, self.mounting or self.usual, heights=altitude in ("gnss", "free"))
 
 
 @dataclass(frozen=True)
@@ -102,10 +104,11 @@ class Odometer(_Mounted):
 
     record: OdometerRecord
     key: ClassVar[str] = "odometer"
+    usual: ClassVar[Mounting] = WHEEL
 
     def sources(self, altitude: str) -> list[Aiding]:
         """Body velocities."""
-        return from_odometer(self.record, self.mounting or WHEEL)
+        return from_odometer(self.record, self.mounting or self.usual)
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ class VelocityLog(_Mounted):
     def sources(self, altitude: str) -> list[Aiding]:
         """Velocities, in body or navigation axes."""
         errors = log_errors(self.errors, self.record.frame)
-        return from_velocity(self.record, self.mounting or Mounting(), errors)
+        return from_velocity(self.record, self.mounting or self.usual, errors)
 
 
 @dataclass(frozen=True)
@@ -154,10 +157,11 @@ class Barometer(_Mounted):
     record: HeightRecord
     loop: float = 0.0
     key: ClassVar[str] = "baro"
+    usual: ClassVar[Mounting] = WEATHER
 
     def sources(self, altitude: str) -> list[Aiding]:
         """Heights, where height is kept by the barometer."""
-        return from_height(self.record, self.mounting or WEATHER, self.loop) if altitude == "baro" else []
+        return from_height(self.record, self.mounting or self.usual, self.loop) if altitude == "baro" else []
 
 
 @dataclass(frozen=True)

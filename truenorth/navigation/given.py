@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from truenorth.aiding.aids import ANTENNA, WEATHER, WHEEL, Aid, Barometer, Gnss, Odometer, VelocityLog
+from truenorth.aiding.aids import ANTENNA, Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.core.errors import UsageError
 from truenorth.navigation.result import Altitude
@@ -17,7 +17,6 @@ from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 AIDS = (Gnss, Odometer, VelocityLog, Barometer)
-USUAL = {"gnss": ANTENNA, "odometer": WHEEL, "baro": WEATHER}
 
 
 def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
@@ -61,8 +60,8 @@ def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
         if _says_the_same(key, aid.mounting or found, found):
             said.append(note("odometer.taken_over" if key == Odometer.key else "gnss.delay_taken_over"))
     for key, aid in given.items():
-        if isinstance(aid, AIDS) and key in USUAL and aid.mounting is None:
-            given[key] = aid.mounted(USUAL[key])
+        if isinstance(aid, AIDS) and aid.mounting is None:
+            given[key] = aid.mounted(aid.usual)
     return said
 
 
@@ -91,7 +90,7 @@ def mounted_as(given: Mapping[str, Any], mountings: Mapping[str, Mounting]) -> d
 
 def looked_at(given: Mapping[str, Any]) -> dict[str, Mounting]:
     """Mountings that a second look can open."""
-    found = {kind.key: USUAL.get(kind.key, Mounting()) for kind in AIDS}
+    found = {kind.key: kind.usual for kind in AIDS}
     return found | {key: a.mounting for key, a in given.items() if getattr(a, "mounting", None) is not None}
 
 
