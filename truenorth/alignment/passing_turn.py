@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truenorth.coarse.analytic import BLOCKS, Means, means, scatter_of
 from truenorth.core.earth import EARTH_RATE
+from truenorth.core.remembered import remembered
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.vibration import cone_drift
@@ -25,6 +26,7 @@ REST = 5  # s of rest, at least, before and after it
 MOSTLY = 0.5  # of the seconds, at most: a median is that of the rest
 
 
+@remembered
 def passing_turns(motion: MotionSummary) -> NDArray[np.bool_]:
     """Seconds (m,) of a still base in which it turns, and after which it rests as before.
 
