@@ -23,7 +23,9 @@ LIMITS: dict[str, Limit] = {
     ),
     # ---- what an answer must reach
     "level": Limit(
-        math.radians(3.0), "rad", "beyond it the small-angle models of all procedures lose their second digit"
+        math.radians(5.0),
+        "rad",
+        "three of it are 15 deg, where small-angle models lose their second digit: x - sin x is 1 %",
     ),
     "pole": Limit(0.1, "1", "cosine of 84 deg latitude, from which the place, not the gyro, is what hides north"),
     "not estimated": Limit(
