@@ -142,3 +142,15 @@ def test_real_recordings_by_options_alone(file, name, options):
     np.testing.assert_allclose(record.time, expected.time, rtol=1e-13)
     np.testing.assert_allclose(record.gyro, expected.gyro, rtol=1e-13)
     np.testing.assert_allclose(record.accel, expected.accel, rtol=1e-13)
+
+
+def test_one_array_of_six_columns_is_the_imu_whatever_lies_next_to_it(save):
+    """Matrices and quaternions of attitude have rows of constant norm, too, but no six columns of which three show gravity."""
+    rng = np.random.default_rng(7)
+    half = 0.5 * np.linspace(0.0, 0.3, 500)
+    quaternion = np.column_stack([np.cos(half), np.sin(half), 0 * half, 0 * half])
+    matrix = np.tile(np.eye(3).ravel(), (500, 1))
+    imu = np.hstack([[0.1, -0.2, 9.8] + 0.02 * rng.standard_normal((500, 3)), 0.3 * rng.standard_normal((500, 3))])
+    record = read_imu(save(dcm=matrix.T, quat=quaternion.T, u=imu.T), rate=100.0, units={"gyro": "rad/s"})
+    np.testing.assert_allclose(record.accel, imu[:, :3], rtol=1e-12)
+    np.testing.assert_allclose(record.gyro, imu[:, 3:], rtol=1e-12)

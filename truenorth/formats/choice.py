@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 import numpy as np
@@ -13,35 +12,18 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.behaviour import accel_readings, gravity_level
+from truenorth.formats.chosen import Choice, with_time
 from truenorth.formats.columns import Columns, listed, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import BLOCKS, Layout
-from truenorth.formats.names import Heading, clock_of, families, heading_of, says_rates
+from truenorth.formats.names import Heading, families, heading_of, says_rates
+from truenorth.formats.unnamed import by_behaviour
 from truenorth.records import COLUMNS, Guess
 from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
 REFERENCE = re.compile(r"([^\[\]]+?)\s*\[\s*(\d+)\s*:\s*(\d+)\s*\]")
-STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
-MOST_COLUMNS = 200  # that are looked at where no name decides
-
-
-@dataclass
-class Choice:
-    """The columns of an IMU in a log."""
-
-    kind: Kind | None  # None: the names do not tell
-    time: tuple[str, ...]  # one column, or two of seconds and their fraction; none where the log has no clock
-    sensors: list[tuple[str, float]]  # list of (str, float); six columns, each with its sign
-    units: dict[str, str] = field(default_factory=dict)  # that the headings name, of ``gyro``, ``accel`` and ``time``
-    documented: bool = False  # the columns have our own names, which mean SI
-    guesses: list[Guess] = field(default_factory=list)
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Seven names for messages."""
-        return (self.time[0] if self.time else "time", *(name for name, _ in self.sensors))
 
 
 def choose(columns: Columns, layout: Layout) -> Choice:
@@ -62,15 +44,15 @@ def choose(columns: Columns, layout: Layout) -> Choice:
         if all(ours in columns.names for ours in COLUMNS[kind]):
             _once(columns, COLUMNS[kind])
             choice = Choice(kind, (), [(ours, 1.0) for ours in COLUMNS[kind]], documented=True)
-            return _with_time(columns, layout, choice)
+            return with_time(columns, layout, choice)
     found = _by_name(columns, layout)
     if found is not None:
-        return _with_time(columns, layout, found)
+        return with_time(columns, layout, found)
     near = [name for name in columns.names if name in {c for names in COLUMNS.values() for c in names}]
     if near:
         wanted = next(c for k in COLUMNS for c in COLUMNS[k] if near[0] in COLUMNS[k] and c not in columns.names)
         raise missing_column(columns, wanted, wanted)
-    return _by_behaviour(columns, layout)
+    return by_behaviour(columns, layout)
 
 
 def _by_size(names: Sequence[str]) -> tuple[Kind, Kind]:
@@ -166,7 +148,7 @@ def _by_caller(columns: Columns, layout: Layout, named: dict[str, tuple[str, flo
     given = {ours: f"{'-' if sign < 0.0 else ''}{name}" for ours, (name, sign) in named.items()}
     given |= {key: layout.columns[key] for key in ("time", "scale", "interval") if key in layout.columns}
     choice.guesses.append(Guess("columns", ", ".join(given.values()), "as the caller says", 1.0, {"columns": given}))
-    return _with_time(columns, layout, choice)
+    return with_time(columns, layout, choice)
 
 
 def _units(headings: Sequence[Heading | None], kind: Kind) -> dict[str, str]:
@@ -237,161 +219,3 @@ def _with_gravity(columns: Columns, sets: list[dict[str, Heading]]) -> list[dict
         if accel_readings(gravity_level(values[np.isfinite(values).all(axis=1)]), np.nan, ("rates",)):
             good.append(axes)
     return good or sets
-
-
-def _with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
-    """The same with its clock: the caller's, the one of that name, the steadiest of several, or the only column that increases."""
-    wanted = layout.columns.get("time")
-    if wanted is not None:
-        if wanted in columns.names or f"{wanted}[0]" in columns.names:
-            choice.time = (wanted if wanted in columns.names else f"{wanted}[0]",)
-        elif layout.rate is None:
-            raise missing_column(columns, "time", wanted)
-        _note_unit(choice, *(clock_of(choice.time[0]) if choice.time else (False, None)))
-        return choice
-    if "interval" in layout.columns:
-        return choice
-    taken = {name for name, _ in choice.sensors}
-    names = [name for name in columns.names if name not in taken]
-    if "time" in names:
-        choice.time = ("time",)
-        return choice
-    clocks = (
-        {name: unit for name in names if (found := clock_of(name))[0] for unit in (found[1],)} if columns.named else {}
-    )
-    whole = [name for name, unit in clocks.items() if re.search(r"(?i)(?:^|[^a-z])secs?$", name)]
-    parts = [name for name in names if re.search(r"(?i)(?:nano_?secs?|nsecs?|nanosec)$", name)]
-    if whole and parts:
-        choice.time = (whole[0], parts[0])
-        choice.units["time"] = "s"
-        choice.guesses.append(Guess("time", f"{whole[0]} + {parts[0]}", "seconds and nanoseconds by their names"))
-        return choice
-    steady = {name: scatter for name in clocks if (scatter := _scatter(columns, name)) is not None}
-    if steady:
-        best = min(
-            steady,
-            key=lambda name: (
-                steady[name] > STEADY,
-                list(clocks).index(name) if steady[name] < 0.05 else 99,
-                steady[name],
-            ),
-        )
-        why = "its name" if len(steady) == 1 else f"of {', '.join(steady)} the steadiest, or the first of equals"
-        choice.time = (best,)
-        choice.guesses.append(Guess("time", best, why, 1.0, {"columns": {"time": best}}))
-        _note_unit(choice, True, clocks[best])
-        return choice
-    wrong = [name for name in clocks if len(columns.column(name)) > 1]
-    if wrong and layout.rate is None:
-        choice.time = (wrong[0],)  # which is refused with the row that is wrong
-        _note_unit(choice, True, clocks[wrong[0]])
-        return choice
-    if layout.rate is None:
-        _clock_by_behaviour(columns, layout, choice, names)
-    return choice
-
-
-def _note_unit(choice: Choice, is_clock: bool, unit: str | None) -> None:
-    if is_clock and unit is not None:
-        choice.units["time"] = unit
-
-
-def _scatter(columns: Columns, name: str) -> float | None:
-    """RMS scatter of a clock's steps over the median one; None where it does not always increase."""
-    try:
-        steps = np.diff(columns.clock(name)[0])
-    except DataError:
-        return None
-    if not steps.size or not np.all(np.isfinite(steps)) or steps.min() < 0.0 or np.median(steps) <= 0.0:
-        return None
-    median = float(np.median(steps))
-    near = steps[steps < 3.0 * median]
-    return float(np.sqrt(np.mean((near / median - 1.0) ** 2)))
-
-
-def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
-    """Take the only column that increases steadily for the clock; a row counter is not a clock."""
-    found = []
-    for name in names[:MOST_COLUMNS]:
-        scatter = _scatter(columns, name)
-        if scatter is not None and scatter < STEADY:
-            steps = np.diff(columns.clock(name)[0])
-            counts = np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name)
-            found.append((name, bool(counts)))
-    clocks = [name for name, counts in found if not counts]
-    if len(clocks) == 1:
-        choice.time = (clocks[0],)
-        choice.guesses.append(
-            Guess(
-                "time",
-                f"column {clocks[0]}",
-                "the only one that increases steadily",
-                1.0,
-                {"columns": {"time": clocks[0]}},
-            )
-        )
-    elif len(clocks) > 1:
-        options = [{"columns": {"time": name}} for name in clocks]
-        raise UnsureError(
-            f"{columns.path.name}: columns {', '.join(clocks)} all increase like a clock", options, choice.guesses
-        )
-
-
-# ------------------------------------------------------------------------------------------- by behaviour
-
-
-def _by_behaviour(columns: Columns, layout: Layout) -> Choice:
-    """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three next to them."""
-    source = columns.path.name
-    numbers = {}
-    for name in columns.names[:MOST_COLUMNS]:
-        try:
-            numbers[name] = columns.read([name], True)[:, 0]
-        except DataError:
-            continue  # text
-    longest = max((len(v) for v in numbers.values()), default=0)
-    numbers = {name: v for name, v in numbers.items() if len(v) == longest}
-    choice = Choice(None, (), [])
-    if longest >= 3:
-        choice = _with_time(columns, layout, choice)
-    skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
-    free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
-    blocks = [free[i : i + 3] for i in range(0, len(free) - 2, 3)]
-    clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
-    interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
-    forces = [
-        block for block in blocks
-        if _constant(values := np.column_stack([numbers[name] for name in block]))
-        and any(
-            accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
-            for scale in (1.0, 1e-3, 1e-6, 1e-9, 1e-4)
-        )
-    ]  # fmt: skip
-    if longest < 3 or not forces or len(blocks) < 2:
-        from truenorth.formats.sensor_folder import hint
-
-        raise DataError(
-            f"{source}: no columns of an IMU among {listed(columns.names)}; expected time, gyro_x .. accel_z (rates "
-            "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
-            + hint(columns.path)
-        )
-    others = [block for block in blocks if block not in forces] if len(forces) == 1 else []
-    if len(forces) > 1 or len(others) > 1:
-        sensor, several = ("accel", forces) if len(forces) > 1 else ("gyro", others)
-        options = [{"columns": {f"{sensor}_{axis}": name for axis, name in zip("xyz", block)}} for block in several]
-        raise UnsureError(
-            f"{source}: {len(several)} sets of three columns may be the {'accelerometers' if sensor == 'accel' else 'gyros'}: "
-            + ", ".join(" ".join(block) for block in several), options, choice.guesses,
-        )  # fmt: skip
-    names = [*others[0], *forces[0]]
-    why = f"the norm of columns {' '.join(forces[0])} is gravity's; {' '.join(others[0])} are the three others"
-    choice.sensors = [(name, 1.0) for name in names]
-    choice.guesses.append(Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(COLUMNS["rates"], names))}))
-    return choice
-
-
-def _constant(values: Array) -> bool:
-    """Whether the norm of three columns stays about the same, as gravity does."""
-    norm = np.linalg.norm(values, axis=1)
-    low, middle, high = np.quantile(norm, [0.25, 0.5, 0.75])
-    return bool(middle > 0.0 and (high - low) < 0.3 * middle)

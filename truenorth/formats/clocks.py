@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.formats.behaviour import clock_readings, size
 from truenorth.formats.checks import check_finite, check_order
-from truenorth.formats.choice import Choice
+from truenorth.formats.chosen import Choice
 from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError, take
 from truenorth.formats.layout import Layout, times, unit_factor

@@ -19,7 +19,8 @@ from truenorth.formats.behaviour import (
     gyro_readings,
 )
 from truenorth.formats.checks import check_finite, check_order
-from truenorth.formats.choice import Choice, choose
+from truenorth.formats.choice import choose
+from truenorth.formats.chosen import Choice
 from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
 from truenorth.formats.guesses import UnsureError, in_words, take

@@ -1,0 +1,135 @@
+"""The columns of an IMU in a log, as chosen, and which of its columns is the clock: by name, by steadiness, by behaviour."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from truenorth.core.errors import DataError
+from truenorth.formats.columns import Columns, missing_column
+from truenorth.formats.guesses import UnsureError
+from truenorth.formats.layout import Layout
+from truenorth.formats.names import clock_of
+from truenorth.records import Guess
+from truenorth.records.imu import Kind
+
+STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
+MOST_COLUMNS = 200  # that are looked at where no name decides
+
+
+@dataclass
+class Choice:
+    """The columns of an IMU in a log."""
+
+    kind: Kind | None  # None: the names do not tell
+    time: tuple[str, ...]  # one column, or two of seconds and their fraction; none where the log has no clock
+    sensors: list[tuple[str, float]]  # list of (str, float); six columns, each with its sign
+    units: dict[str, str] = field(default_factory=dict)  # that the headings name, of ``gyro``, ``accel`` and ``time``
+    documented: bool = False  # the columns have our own names, which mean SI
+    guesses: list[Guess] = field(default_factory=list)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Seven names for messages."""
+        return (self.time[0] if self.time else "time", *(name for name, _ in self.sensors))
+
+
+def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
+    """The same with its clock: the caller's, the one of that name, the steadiest of several, or the only column that increases."""
+    wanted = layout.columns.get("time")
+    if wanted is not None:
+        if wanted in columns.names or f"{wanted}[0]" in columns.names:
+            choice.time = (wanted if wanted in columns.names else f"{wanted}[0]",)
+        elif layout.rate is None:
+            raise missing_column(columns, "time", wanted)
+        _note_unit(choice, *(clock_of(choice.time[0]) if choice.time else (False, None)))
+        return choice
+    if "interval" in layout.columns:
+        return choice
+    taken = {name for name, _ in choice.sensors}
+    names = [name for name in columns.names if name not in taken]
+    if "time" in names:
+        choice.time = ("time",)
+        return choice
+    clocks = (
+        {name: unit for name in names if (found := clock_of(name))[0] for unit in (found[1],)} if columns.named else {}
+    )
+    whole = [name for name, unit in clocks.items() if re.search(r"(?i)(?:^|[^a-z])secs?$", name)]
+    parts = [name for name in names if re.search(r"(?i)(?:nano_?secs?|nsecs?|nanosec)$", name)]
+    if whole and parts:
+        choice.time = (whole[0], parts[0])
+        choice.units["time"] = "s"
+        choice.guesses.append(Guess("time", f"{whole[0]} + {parts[0]}", "seconds and nanoseconds by their names"))
+        return choice
+    steady = {name: scatter for name in clocks if (scatter := _scatter(columns, name)) is not None}
+    if steady:
+        best = min(
+            steady,
+            key=lambda name: (
+                steady[name] > STEADY,
+                list(clocks).index(name) if steady[name] < 0.05 else 99,
+                steady[name],
+            ),
+        )
+        why = "its name" if len(steady) == 1 else f"of {', '.join(steady)} the steadiest, or the first of equals"
+        choice.time = (best,)
+        choice.guesses.append(Guess("time", best, why, 1.0, {"columns": {"time": best}}))
+        _note_unit(choice, True, clocks[best])
+        return choice
+    wrong = [name for name in clocks if len(columns.column(name)) > 1]
+    if wrong and layout.rate is None:
+        choice.time = (wrong[0],)  # which is refused with the row that is wrong
+        _note_unit(choice, True, clocks[wrong[0]])
+        return choice
+    if layout.rate is None:
+        _clock_by_behaviour(columns, layout, choice, names)
+    return choice
+
+
+def _note_unit(choice: Choice, is_clock: bool, unit: str | None) -> None:
+    if is_clock and unit is not None:
+        choice.units["time"] = unit
+
+
+def _scatter(columns: Columns, name: str) -> float | None:
+    """RMS scatter of a clock's steps over the median one; None where it does not always increase."""
+    try:
+        steps = np.diff(columns.clock(name)[0])
+    except DataError:
+        return None
+    if not steps.size or not np.all(np.isfinite(steps)) or steps.min() < 0.0 or np.median(steps) <= 0.0:
+        return None
+    median = float(np.median(steps))
+    near = steps[steps < 3.0 * median]
+    return float(np.sqrt(np.mean((near / median - 1.0) ** 2)))
+
+
+def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
+    """Take the only column that increases steadily for the clock; a row counter is not a clock."""
+    found = []
+    for name in names[:MOST_COLUMNS]:
+        scatter = _scatter(columns, name)
+        if scatter is not None and scatter < STEADY:
+            steps = np.diff(columns.clock(name)[0])
+            counts = np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name)
+            found.append((name, bool(counts)))
+    clocks = [name for name, counts in found if not counts]
+    if len(clocks) == 1:
+        choice.time = (clocks[0],)
+        choice.guesses.append(
+            Guess(
+                "time",
+                f"column {clocks[0]}",
+                "the only one that increases steadily",
+                1.0,
+                {"columns": {"time": clocks[0]}},
+            )
+        )
+    elif len(clocks) > 1:
+        options = [{"columns": {"time": name}} for name in clocks]
+        raise UnsureError(
+            f"{columns.path.name}: columns {', '.join(clocks)} all increase like a clock", options, choice.guesses
+        )

@@ -1,0 +1,93 @@
+"""Columns of an IMU whose names do not say what they are: accelerometers show gravity, gyros are the three next to them."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.errors import DataError
+from truenorth.formats.behaviour import accel_readings, gravity_level
+from truenorth.formats.chosen import MOST_COLUMNS, Choice, with_time
+from truenorth.formats.columns import Columns, listed
+from truenorth.formats.guesses import UnsureError
+from truenorth.formats.layout import Layout
+from truenorth.records import COLUMNS, Guess
+
+Array = NDArray[np.float64]
+
+
+def by_behaviour(columns: Columns, layout: Layout) -> Choice:
+    """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three next to them."""
+    source = columns.path.name
+    numbers = {}
+    for name in columns.names[:MOST_COLUMNS]:
+        try:
+            numbers[name] = columns.read([name], True)[:, 0]
+        except DataError:
+            continue  # text
+    longest = max((len(v) for v in numbers.values()), default=0)
+    numbers = {name: v for name, v in numbers.items() if len(v) == longest}
+    choice = Choice(None, (), [])
+    if longest >= 3:
+        choice = with_time(columns, layout, choice)
+    skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
+    free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
+    groups = [list(names) for _, names in groupby(free, _variable)]
+    blocks = [group[i : i + 3] for group in groups for i in range(0, len(group) - 2, 3)]
+    clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
+    interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
+    forces = [
+        block for block in blocks
+        if _constant(values := np.column_stack([numbers[name] for name in block]))
+        and any(
+            accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
+            for scale in (1.0, 1e-3, 1e-6, 1e-9, 1e-4)
+        )
+    ]  # fmt: skip
+    alone = [pair for group in groups if (pair := _pair(group, blocks, forces))]
+    if len(alone) == 1:  # one variable is an IMU by itself, whatever the others are: attitude, for one
+        blocks, forces = alone[0]
+    if longest < 3 or not forces or len(blocks) < 2:
+        from truenorth.formats.sensor_folder import hint
+
+        raise DataError(
+            f"{source}: no columns of an IMU among {listed(columns.names)}; expected time, gyro_x .. accel_z (rates "
+            "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
+            + hint(columns.path)
+        )
+    others = [block for block in blocks if block not in forces] if len(forces) == 1 else []
+    if len(forces) > 1 or len(others) > 1:
+        sensor, several = ("accel", forces) if len(forces) > 1 else ("gyro", others)
+        options = [{"columns": {f"{sensor}_{axis}": name for axis, name in zip("xyz", block)}} for block in several]
+        raise UnsureError(
+            f"{source}: {len(several)} sets of three columns may be the {'accelerometers' if sensor == 'accel' else 'gyros'}: "
+            + ", ".join(" ".join(block) for block in several), options, choice.guesses,
+        )  # fmt: skip
+    names = [*others[0], *forces[0]]
+    why = f"the norm of columns {' '.join(forces[0])} is gravity's; {' '.join(others[0])} are the three others"
+    choice.sensors = [(name, 1.0) for name in names]
+    choice.guesses.append(Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(COLUMNS["rates"], names))}))
+    return choice
+
+
+def _variable(name: str) -> str:
+    """The array that a column belongs to, as ``u`` of ``u[3]``; nothing for the columns of a table."""
+    return name.rpartition("[")[0]
+
+
+def _pair(
+    group: list[str], blocks: list[list[str]], forces: list[list[str]]
+) -> tuple[list[list[str]], list[list[str]]] | None:
+    """The blocks of a variable that has two, and the one of them that shows gravity; None of any other variable."""
+    own = [block for block in blocks if block[0] in group]
+    shown = [block for block in own if block in forces]
+    return (own, shown) if len(own) == 2 and len(shown) == 1 else None
+
+
+def _constant(values: Array) -> bool:
+    """Whether the norm of three columns stays about the same, as gravity does."""
+    norm = np.linalg.norm(values, axis=1)
+    low, middle, high = np.quantile(norm, [0.25, 0.5, 0.75])
+    return bool(middle > 0.0 and (high - low) < 0.3 * middle)
