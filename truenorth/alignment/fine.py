@@ -183,6 +183,8 @@ def fine_align(
     integrals: InertialIntegrals | None = None,
     form: Form = "velocity",
     turned: ImuSpec | None = None,
+    *,
+    sways: bool = False,
 ) -> FineAlignment:
     """Estimate attitude and biases from a whole log.
 
@@ -196,8 +198,11 @@ def fine_align(
     turned : ImuSpec, optional
         Of an IMU that is turned about on its base: scale factors, misalignments and the arm from the axis of the turns are states
         then, and `P_bias` is of the biases proper.
+    sways : bool
+        Whether the base sways: its sway is averaged out of the attitude by which biases act
+        (:func:`truenorth.errors.sway.without_sway`). What its motion does in step with the tilt is no signature of a bias.
     """
-    log, last, disturbance = settle_fine(start, integrals, form, turned)
+    log, last, disturbance = settle_fine(start, integrals, form, turned, sways=sways)
     return FineAlignment.of(log, last, log.prior.sensors, disturbance)
 
 
@@ -207,12 +212,15 @@ def settle_fine(
     form: Form = "velocity",
     turned: ImuSpec | None = None,
     *,
+    sways: bool = False,
     history: bool = True,
 ) -> tuple[StayingLog, Settled[Filtered], Array]:
     """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains (or a history) are not wanted."""
     record, C_n0_i, position, model, P_bias, interval, rows_at = start
     prior = prior_of(P_bias) if turned is None else prior_of(P_bias, spec=turned, arm=np.zeros(3), arm_sigma=TURN_ARM)
-    log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, form=form)
+    log = StayingLog(
+        record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, sways=sways, form=form
+    )
     if form == "velocity":
         R = white_variance(mean_velocity(log.integrals, C_n0_i, position.lat, position.alt))
     else:

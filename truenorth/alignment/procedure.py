@@ -32,6 +32,7 @@ from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
+from truenorth.alignment.sway_colour import sway_harmonics
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
@@ -46,7 +47,7 @@ from truenorth.alignment.turning import (
 )
 from truenorth.alignment.verdict import base_evidence, judged, leaves, no_attitude
 from truenorth.coarse import coarse_covariance, dual_vector, oba
-from truenorth.coarse.uncertainty import base_velocity
+from truenorth.coarse.uncertainty import own_motion
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.staying import BA, BG, StaticModel, gained_velocity
@@ -70,6 +71,7 @@ NO_FORCE = 1e-6  # m/s^2, mean specific force that shows no vertical: accelerome
 SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
 GOES = 10.0  # m: of the way from where a base was in the mean, that still passes for sway
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
+RECENT = 60.0  # s: whose own motion of the base is that of the epoch
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
 TURNED = math.radians(30.0)  # less in a short log may be part of a sway
@@ -222,8 +224,11 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     used, where = (infer_turning(task), INFERRED) if spec is None else (spec, f"specification {spec.name!r}")
     fine = turning_align(task, used, np.array([task.epoch.row]))
     answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
+    # The fit takes the arm from the axis: it leaves no motion. Where nothing says so, the IMU moves on as it did.
+    moved = own_motion(fine.integrals, fine.C_n0_i, task.position.lat, task.position.alt, RECENT)
     answer = replace(
         answer,
+        disturbance=np.maximum(answer.disturbance, moved),
         phi_covariance=without_heading(answer.phi_covariance),
         phi_floor=without_heading(answer.phi_floor),
         pays_until=None,
@@ -261,7 +266,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if method in STATIONARY:
         return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
     if not refined:
-        disturbance = np.sqrt(np.mean(base_velocity(integrals, coarse.C_n0_i, lat, alt) ** 2, axis=0))
+        disturbance = own_motion(integrals, coarse.C_n0_i, lat, alt)
         covariance, floor = coarse_covariance(coarse, integrals, StaticModel.of(used), P, disturbance)
         C_n0_b = coarse.C_n0_i @ task.epoch.attitude(integrals.C_ib_at[0])
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
@@ -291,7 +296,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     elif turned is not None:
         fine = fine_align(start, turned=turned)
     else:
-        fine = fine_align(start, integrals, picked)
+        fine = fine_align(start, integrals, picked, sways=task.motion.overall != "still")
     del integrals, filtered, coarse  # of the first pass; what follows takes memory
     answer = replace(answer_of(task, fine, used, where, P, sways), ongoing=go_on(task, fine, StaticModel.of(used)))
     if turned is not None:  # the check knows no scale factors
@@ -299,7 +304,10 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways else None
+    smeared = turned is None and not sways and fine.form == "velocity" and task.motion.overall != "still"
+    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways or smeared else None
+    if smeared:
+        others = np.concatenate([sway_harmonics(fine), *([] if others is None else [others])], axis=2)
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
     heave = fine.heave if isinstance(fine, SwayAlignment) else None

@@ -28,7 +28,7 @@ from truenorth.alignment.swing import may_swing, swing_note, swings
 from truenorth.alignment.swing_fit import ARM, fit_swing
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse import oba
-from truenorth.coarse.uncertainty import base_velocity, detrended
+from truenorth.coarse.uncertainty import detrended, own_motion
 from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
 from truenorth.errors.matrices import matrices_of, without_errors
@@ -207,7 +207,7 @@ def _filtered(log: StayingLog, estimator: _MotionFilter, misfit: Callable[[Posit
     last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
     position, arm = log.position, log.prior.groups["arm"]
     # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
-    seen = np.sqrt(np.mean(base_velocity(log.integrals, log.C_n0_i, position.lat, position.alt) ** 2, axis=0))
+    seen = own_motion(log.integrals, log.C_n0_i, position.lat, position.alt)
     fine = SwayAlignment.of(
         log,
         last,

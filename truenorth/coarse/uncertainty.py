@@ -29,10 +29,20 @@ def bias_response(integrals: InertialIntegrals, C_n0_i: Array) -> tuple[Array, A
     return dv, dp
 
 
-def base_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
-    """(K+1, 3) velocity of the base itself in ``n0``, m/s: what is left of the computed velocity above a smooth trend."""
+def base_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float, last: float = np.inf) -> Array:
+    """(K+1, 3) velocity of the base itself in ``n0``, m/s: what is left of the computed velocity above a smooth trend.
+
+    Only the epochs of the `last` seconds, if that is less than the log.
+    """
     v = integrals.velocity @ C_n0_i.T + gravity_velocity(integrals.time, lat, alt)
-    return detrended(integrals.time, v)
+    kept = integrals.time >= integrals.time[-1] - last
+    return detrended(integrals.time[kept], v[kept])
+
+
+def own_motion(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float, last: float = np.inf) -> Array:
+    """(3,) RMS velocity of the base itself in ``n0``, m/s, in the `last` seconds."""
+    moved = base_velocity(integrals, C_n0_i, lat, alt, last)
+    return np.asarray(np.sqrt(np.mean(np.square(moved), axis=0)))
 
 
 def detrended(time: Array, v: Array) -> Array:

@@ -221,7 +221,9 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     return system.with_made(**bigger, R=system.R + np.diag(white**2 - QUIETEST_BASE**2))
 
 
-def without_sway(integrals: InertialIntegrals, C_sb: Array | None = None) -> InertialIntegrals:
+def without_sway(
+    integrals: InertialIntegrals, C_sb: Array | None = None, *, straight: bool = False
+) -> InertialIntegrals:
     """The integrals with the base's sway averaged out of the attitude by which biases act; an indexer's turning stays.
 
     A bias seen from a base that sways makes a velocity of the sway's own periods, tenths of a mm/s of 100 ug. So do scale
@@ -233,12 +235,16 @@ def without_sway(integrals: InertialIntegrals, C_sb: Array | None = None) -> Ine
     integrals : InertialIntegrals
     C_sb : (K+1, 3, 3) array, optional
         Attitude of the base in the IMU at the integrals' times; the two are one when left out.
+    straight : bool
+        Whether the base has no slow turn either: where gyros know it so badly that a turn of theirs would show the biases.
     """
     turned = None if C_sb is None else _half_way(C_sb)
     basis = _line(len(integrals.C_mean))
 
     def slow(C: Array) -> Array:
-        mean = (basis @ sway_trend(C if turned is None else C @ turned)).reshape(-1, 3, 3)
+        trend = sway_trend(C if turned is None else C @ turned)
+        trend[1] *= not straight
+        mean = (basis @ trend).reshape(-1, 3, 3)
         return mean if turned is None else mean @ np.swapaxes(turned, 1, 2)
 
     return replace(integrals, C_mean=slow(integrals.C_mean), C_late=slow(integrals.C_late))

@@ -197,7 +197,8 @@ class StayingLog:
     def linearise(self) -> LinearSystem:
         """The system of the errors that are left; of the base's own motion R holds the least that it can be."""
         lat, alt, groups = self.position.lat, self.position.alt, self.prior.groups
-        slow = without_sway(self.integrals, self.C_sb) if self.sways else self.integrals
+        blind = "rate" in groups  # gyros that do not see the earth turn know no slow turn about the vertical
+        slow = without_sway(self.integrals, self.C_sb, straight=blind) if self.sways else self.integrals
         P0 = self.prior.P
         system = core_system(
             self.noise, slow, self.integrals, self.C_n0_i, self.position, P0[:STATES, :STATES], self.form
