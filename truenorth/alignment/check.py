@@ -101,10 +101,11 @@ def check_filter(
     P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
     noise = usual if known is None else known
     start = CoarseStart(task.record, C_n0_i, task.position, noise, P, task.interval)
-    log, last, _ = settle_fine(start, integrals, history=False)
+    sways = task.motion.overall != "still"
+    log, last, _ = settle_fine(start, integrals, sways=sways, history=False)
     if known is None:
         noise = fit_task_noise(task, log.integrals, log.C_n0_i, log.prior.P, usual)
-        log, last, _ = settle_fine(start._replace(C_n0_i=log.C_n0_i, model=noise), history=False)
+        log, last, _ = settle_fine(start._replace(C_n0_i=log.C_n0_i, model=noise), sways=sways, history=False)
 
     lat = task.position.lat
     C = earth_rotation(log.integrals.time[-1], lat).T @ log.C_n0_i @ log.integrals.C_ib[-1]
