@@ -21,7 +21,7 @@ from truenorth.alignment.usual import wandering_as_usual
 from truenorth.analysis.student import as_normal
 from truenorth.coarse.analytic import BLOCKS, Means
 from truenorth.core.earth import EARTH_RATE, gravity_of_place
-from truenorth.errors.staying import BA, BG, BIASES, StaticModel, mean_velocity
+from truenorth.errors.staying import BA, BG, BIASES, STATES, StaticModel, mean_velocity
 from truenorth.errors.walks import Walks
 from truenorth.estimate.base_motion import white_variance
 from truenorth.filters import LinearSystem
@@ -104,7 +104,7 @@ def check_filter(
     sways = task.motion.overall != "still"
     log, last, _ = settle_fine(start, integrals, sways=sways, history=False)
     if known is None:
-        noise = fit_task_noise(task, log.integrals, log.C_n0_i, log.prior.P, usual)
+        noise = fit_task_noise(task, log.integrals, log.C_n0_i, log.prior.P[:STATES, :STATES], usual)
         log, last, _ = settle_fine(start._replace(C_n0_i=log.C_n0_i, model=noise), sways=sways, history=False)
 
     lat = task.position.lat

@@ -42,8 +42,10 @@ Array = NDArray[np.float64]
 
 MAX_PASSES = 8
 MAX_NOISE_PASSES = 6
+ARM_PRIOR = 30.0  # m, one sigma along each axis, of a base that sways, where nobody knows the arm
 TURN_ARM = 1.0  # m, one sigma along each axis: from the axis of a turntable to the IMU
 TURNED = 3.0  # how much of a correction the next pass may move, for each radian that the linearisation turns; twice the most seen
+LEVEL = slice(PHI.start, PHI.stop - 1)
 SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at least
 
 
@@ -199,8 +201,8 @@ def fine_align(
         Of an IMU that is turned about on its base: scale factors, misalignments and the arm from the axis of the turns are states
         then, and `P_bias` is of the biases proper.
     sways : bool
-        Whether the base sways: its sway is averaged out of the attitude by which biases act
-        (:func:`truenorth.errors.sway.without_sway`). What its motion does in step with the tilt is no signature of a bias.
+        Whether the base sways. The arm from its centre is a state then, and its sway is averaged out of the attitude by which
+        biases act (:func:`truenorth.errors.sway.without_sway`): what moves in step with the tilt is no signature of a bias.
     """
     log, last, disturbance = settle_fine(start, integrals, form, turned, sways=sways)
     return FineAlignment.of(log, last, log.prior.sensors, disturbance)
@@ -217,7 +219,9 @@ def settle_fine(
 ) -> tuple[StayingLog, Settled[Filtered], Array]:
     """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains (or a history) are not wanted."""
     record, C_n0_i, position, model, P_bias, interval, rows_at = start
-    prior = prior_of(P_bias) if turned is None else prior_of(P_bias, spec=turned, arm=np.zeros(3), arm_sigma=TURN_ARM)
+    arm_sigma = TURN_ARM if turned is not None else ARM_PRIOR
+    arm = None if turned is None and not sways else np.zeros(3)
+    prior = prior_of(P_bias, spec=turned, arm=arm, arm_sigma=arm_sigma)
     log = StayingLog(
         record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, sways=sways, form=form
     )
@@ -239,11 +243,14 @@ def left_over(elapsed: float) -> Callable[[Filtered], float]:
     The system depends on the nominal attitude alone. A pass that finds it off by an angle turns the next system by that angle at
     the most, and what is found changes by as much of itself. Of 48 alignments (three grades of IMU, 45 and 75 degrees north, by
     both forms) the next pass moved .1 to 1.4 times the correction and the angle.
+
+    A heading that is not known to a radian moves as it likes: it is not asked.
     """
 
     def left(found: Filtered) -> float:
         turned = float(np.linalg.norm(found.end[PHI]) + np.linalg.norm(found.end[BG]) * elapsed)
-        return in_sigmas(PHI)(found) * min(1.0, TURNED * turned)
+        asked = PHI if found.P[PHI, PHI][2, 2] < 1.0 else LEVEL
+        return in_sigmas(asked)(found) * min(1.0, TURNED * turned)
 
     return left
 

@@ -32,7 +32,6 @@ from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
-from truenorth.alignment.sway_colour import sway_harmonics
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
@@ -43,6 +42,7 @@ from truenorth.alignment.turning import (
     turning_align,
     turning_noise,
     turns_blindly,
+    was_blind,
     with_usual,
 )
 from truenorth.alignment.verdict import base_evidence, judged, leaves, no_attitude
@@ -74,6 +74,10 @@ STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes
 RECENT = 60.0  # s: whose own motion of the base is that of the epoch
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
+TURNS_BLINDLY = (
+    "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis "
+    f"are fitted, nothing finds north{POSITIONS}"
+)
 TURNED = math.radians(30.0)  # less in a short log may be part of a sway
 
 
@@ -146,18 +150,15 @@ def align_base(
         asked = "" if method == "auto" else f"{method} was asked for, but "
         chosen, why, found = "analytic", f"{asked}{NO_NORTH}", _Found(*level_from_means(task, spec))
     elif turned := (method == "auto" and chosen != "analytic" and turns_blindly(task, spec)):
-        chosen = "kalman"
-        why = (
-            "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis "
-            f"are fitted, nothing finds north{POSITIONS}"
-        )
-        found = _align_turning(task, spec)
+        chosen, why, found = "kalman", TURNS_BLINDLY, _align_turning(task, spec)
     elif chosen == "analytic":
         found = _Found(*from_means(task, spec))
     else:
         found = _align_inertial(task, spec, chosen, sound)
         if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit):
             chosen, why, found = "analytic", NO_NORTH, _Found(*level_from_means(task, spec))
+        elif turned := (method == "auto" and spec is None and was_blind(task, found.answer.imu)):
+            chosen, why, found = "kalman", TURNS_BLINDLY, _align_turning(task, spec)
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     fitted = chosen == "swaying" or turned
@@ -304,10 +305,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    smeared = turned is None and not sways and fine.form == "velocity" and task.motion.overall != "still"
-    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways or smeared else None
-    if smeared:
-        others = np.concatenate([sway_harmonics(fine), *([] if others is None else [others])], axis=2)
+    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways else None
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
     heave = fine.heave if isinstance(fine, SwayAlignment) else None

@@ -23,13 +23,13 @@ from truenorth.alignment.accel_scale import accel_scale_evidence
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.encoder_angles import angles_at, carried_angles
-from truenorth.alignment.fine import CoarseStart, FineAlignment
+from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
-from truenorth.alignment.swaying import ARM_PRIOR, Mount, SwayAlignment, sway_align
+from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
 from truenorth.alignment.turning import infer_turning
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence

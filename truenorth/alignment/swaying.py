@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import bias_signatures
-from truenorth.alignment.fine import CoarseStart, FineAlignment
+from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.late_gyros import response_to_late_gyros
 from truenorth.alignment.matched import innovations_of, matched
@@ -43,7 +43,6 @@ from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, in
 
 Array = NDArray[np.float64]
 
-ARM_PRIOR = 30.0  # m, one sigma along each axis, where nobody knows the arm
 WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled

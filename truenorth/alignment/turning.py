@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.check import BLIND_RATE, LogCheck
-from truenorth.alignment.fine import MAX_NOISE_PASSES, TURN_ARM, FineAlignment
+from truenorth.alignment.fine import ARM_PRIOR, MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import GYRO_WIDTH, infer_spec
-from truenorth.alignment.swaying import ARM_PRIOR, farthest
+from truenorth.alignment.swaying import farthest
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.alignment.usual import usual
 from truenorth.core.earth import EARTH_RATE, gravity_of_place
@@ -56,7 +56,7 @@ def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
     """Whether the IMU turns or sways in its log, and its gyros are too poor to see the earth turn."""
     overall, rocks = task.motion.overall, rocks_all_along(task.motion)
     turns = overall in TURNING and task.motion.fraction("rotating") > 0.0  # for a while, of a base that stays
-    if not (turns or overall == "swaying" or (overall == "moving" and rocks)):
+    if not (turns or overall == "swaying" or (overall in ("moving", "disturbed") and rocks)):
         return False
     if spec is not None:
         return spec.gyro_bias > BLIND_RATE
@@ -66,6 +66,11 @@ def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
         walks = sway_walks(task.record)
         walk = None if walks is None else walks.gyro_random_walk
     return walk is not None and usual("gyro", "bias", walk) > BLIND_RATE
+
+
+def was_blind(task: Task, inferred: ImuSpec) -> bool:
+    """The same, with the specification that an alignment has inferred: by its noise, too, since a base that leaves seems a bias."""
+    return turns_blindly(task, inferred) and usual("gyro", "bias", inferred.gyro_random_walk) > BLIND_RATE
 
 
 def rocks_all_along(motion: MotionSummary) -> bool:

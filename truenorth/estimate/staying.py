@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
 HEADING_PRIOR = np.pi / np.sqrt(3.0)  # rad: nothing is known
+WIDEST = 1.0  # rad, by which a pass turns heading
 VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
 
 
@@ -220,7 +221,11 @@ class StayingLog:
         return system.with_made(x0=self.prior.mean - self.taken, P0=P0)
 
     def correct(self, x: Array) -> None:
-        """Take the errors at the last epoch off: of attitude back at the start, of sensors and arm as they are."""
+        """Take the errors at the last epoch off: of attitude back at the start, of sensors and arm as they are.
+
+        A part of them where they turn heading by more than a radian: farther away the system is another one.
+        """
+        x = x * min(1.0, WIDEST / max(abs(float(x[PHI][2])), 1e-9))
         # phi(0) = phi(end) + int C_n0_b (eps + M_g w); then everything anew about the estimate.
         back = x[PHI] + np.einsum("k,kab->ab", self.integrals.intervals, self.C_n0_i @ self.integrals.C_mean) @ x[BG]
         matrices = self.prior.groups.get("matrices")
