@@ -171,6 +171,29 @@ def seconds(sways: bool) -> Any:
     return scenario
 
 
+def middle_sway(*grades: str) -> Any:
+    """A log of 20 to 60 s of a base that sways by .05 to 5 deg with three periods about each axis, the IMU .3 to 3 m off."""
+
+    def scenario(rng: np.random.Generator) -> Mapping[str, Any]:
+        size = 0.05 * 100.0 ** rng.random()
+        tones = {
+            name: [
+                {"amplitude": f"{size * part * rng.uniform(0.3, 1.0)} deg", "period": f"{rng.uniform(3.0, 15.0)} s"}
+                for _ in range(3)
+            ]
+            for name, part in (("roll", 1.0), ("pitch", 0.7), ("heading", 0.5))
+        }
+        return {
+            "duration": f"{rng.uniform(20.0, 60.0):.1f} s",
+            "position": place(rng),
+            "lever_arm": [f"{a} m" for a in rng.uniform(-1.0, 1.0, 3) * rng.choice([0.3, 1.0, 3.0])],
+            "motion": {"kind": "sway", "heading": f"{rng.uniform(0.0, 360.0):.3f} deg", "tones": tones},
+            "imu": str(rng.choice(grades)),
+        }
+
+    return scenario
+
+
 def _by_rotary(axes: tuple[str, ...], imu: Any = "navigation", angle_sigma: float = 0.0) -> Any:
     def call(log: Log) -> Alignment:
         return align_rotary(log.record, log.encoder, log.position, imu, axes=axes, angle_sigma=angle_sigma)
@@ -207,6 +230,9 @@ CASES = (
     Case("gyros off by .5 to 20 deg/s at rest", offset, _with("consumer"), ("level_only",)),
     Case("seconds of rest, no specification", seconds(False), _with(None), BRIEF),
     Case("seconds of sway, no specification", seconds(True), _with(None), BRIEF),
+    Case("20 to 60 s of sway, tactical", middle_sway("tactical"), _with("tactical"), BRIEF),
+    Case("20 to 60 s of sway, industrial", middle_sway("industrial"), _with("industrial"), BRIEF),
+    Case("20 to 60 s of sway, no specification", middle_sway(*PRESETS), _with(None), BRIEF),
 )
 
 if __name__ == "__main__":
