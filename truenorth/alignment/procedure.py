@@ -161,8 +161,7 @@ def align_base(
             chosen, why, found = "kalman", TURNS_BLINDLY, _align_turning(task, spec)
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
-    fitted = chosen == "swaying" or turned
-    moves = None if fitted and _explained(task.motion, found) else task.motion.moves_at
+    moves = None if math.isfinite(found.way) and _explained(task.motion, found) else task.motion.moves_at
     biased = math.sqrt(float(answer.imu.bias_variance[3:].max()))
     evidence = record_evidence(task.record, task.motion, sound=sound, accel_bias=biased) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
@@ -187,7 +186,7 @@ class _Found:
     drift: Drift | None = None
     form: str = ""
     steps: Sequence[Evidence] = ()
-    way: float = math.inf  # m, that a swaying base is from its mean place at most
+    way: float = math.inf  # m, that a base whose arm was fitted is from its mean place at most
     heave: Heave | None = None  # of a swaying base
     acted: float | None = None  # share of the epochs in which factors of a published filter acted
 
@@ -273,7 +272,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
         return _Found(replace(answer, disturbance=disturbance), check)
 
-    sways, turned = method == "swaying", None
+    sways, turned, swings = method == "swaying", None, task.motion.overall != "still"
     if turns and method not in FADING:
         turned = used = with_usual(used) if spec is None else used
         P = np.diag(used.bias_variance)
@@ -297,7 +296,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     elif turned is not None:
         fine = fine_align(start, turned=turned)
     else:
-        fine = fine_align(start, integrals, picked, sways=task.motion.overall != "still")
+        fine = fine_align(start, integrals, picked, sways=swings)
     del integrals, filtered, coarse  # of the first pass; what follows takes memory
     answer = replace(answer_of(task, fine, used, where, P, sways), ongoing=go_on(task, fine, StaticModel.of(used)))
     if turned is not None:  # the check knows no scale factors
@@ -315,7 +314,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         steps += scale_on_sway_evidence(
             fine, task.record, lambda record: sway_align(about._replace(record=record), turned=turned, axes=spec)
         )
-    way = farthest(fine, task.position) if sways else math.inf
+    way = farthest(fine, task.position) if sways or (swings and turned is None) else math.inf
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave)
 
 
