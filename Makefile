@@ -17,7 +17,7 @@ KEPT := MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432
 
 install: $(WARM)
 
-# It installs and compiles what it needs itself: a quarter of the packages, and of what `warm` compiles.
+# It installs and compiles what it needs itself: a quarter of the packages, and what does not come with the package.
 demo: $(RUNS)
 	$(BIN)/python examples/demo.py
 
