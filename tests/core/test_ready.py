@@ -11,7 +11,7 @@ import pytest
 
 from truenorth.core import processor, ready
 from truenorth.core.compiled import compiled
-from truenorth.core.kernel_folder import write
+from truenorth.core.kernel_folder import content_of, write
 from truenorth.core.kernel_store import machine_code_of
 from truenorth.core.machine_code import WRAPPER, CannotLinkError, MachineCode, can_link
 from truenorth.core.numba_part import numba_part
@@ -242,6 +242,18 @@ def test_the_package_is_asked_where_the_cache_has_nothing(code, tmp_path, monkey
     (tmp_path / name.kept).unlink()
     file.write_bytes(file.read_bytes()[:-1])
     assert ready.found(name, bytes) is None
+
+
+@pytest.mark.skipif(
+    not processor.shipped_level(), reason="no kernels come with the package for this processor and Python"
+)
+def test_what_comes_with_the_package_is_whole():
+    """Also what is of older sources, which nobody calls."""
+    files = list(processor.folder_of(processor.shipped_level()).iterdir())
+    assert len(files) > 20
+    for file in files:
+        code = MachineCode(content_of(file), numba_part("_dynfunc").Environment({}))
+        assert code.function(WRAPPER) > 0
 
 
 def test_machine_code_is_linked_beside_numbas(code):
