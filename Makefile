@@ -13,11 +13,11 @@ export PYTHONDONTWRITEBYTECODE :=
 KEPT := MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432
 
 .DEFAULT_GOAL := demo
-.PHONY: install demo test test-all check format bench docs notebooks messages release lock clean
+.PHONY: install demo test test-all check format bench docs notebooks messages kernels release lock clean
 
 install: $(WARM)
 
-# It installs and compiles what it needs itself: a quarter of the packages, and of what `warm` compiles.
+# It installs and compiles what it needs itself: a quarter of the packages, and what does not come with the package.
 demo: $(RUNS)
 	$(BIN)/python examples/demo.py
 
@@ -56,7 +56,11 @@ notebooks: $(READY)
 messages: $(READY)
 	$(BIN)/python -m tests.report.catalogue
 
-release: $(READY)
+# Machine code that comes with the package. An edit of a kernel leaves it unused, and the kernel is compiled as any other.
+kernels: $(READY)
+	$(BIN)/python .ci/kernels.py
+
+release: kernels
 	$(BIN)/python .ci/release.py
 
 # All extras but cuda: NVIDIA's compiler is half a gigabyte, of use only where there is a device.

@@ -31,7 +31,9 @@ def main() -> int:
         lever_arm=(1.0, 3.0, 1.0),
     )
     compile_ahead()  # the first time on a computer; the command would do it by itself, a little later
-    print("the first time on a computer the filters are compiled, some 20 s; after that the demo takes seconds")
+    print(
+        "filters that this computer does not have yet are compiled first, some 20 s; after that the demo takes seconds"
+    )
     print("simulating 600 s at 100 Hz of a navigation-grade SINS on a swaying ship ...")
     simulation = simulate(ship, rate=100.0, duration=600.0, imu=truenorth.imu_spec("navigation"), seed=1)
     log = FOLDER / "ship.csv"

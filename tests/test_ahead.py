@@ -10,9 +10,10 @@ from truenorth.alignment.bias_step import _follow
 from truenorth.alignment.matched import _sum_back
 from truenorth.alignment.motion_likelihood import _folded_autocovariances
 from truenorth.cli import ahead
-from truenorth.core import kernel_folder
+from truenorth.core import kernel_folder, processor
 from truenorth.core.kernel_lock import KernelLock
 from truenorth.core.position import Position
+from truenorth.core.ready import kind_of
 from truenorth.errors.sway import fill_blocks
 from truenorth.filters.gains import _fill, _parts, _through
 from truenorth.filters.linear import linear_runs
@@ -44,6 +45,7 @@ def test_its_kernels_are_those_of_an_alignment():
     ahead.match()
     ahead.turn()
     ahead._filtered(ahead.STATES)
+    assert kind_of(ahead._of_last()) in _sum_back.signatures
     assert [kinds(kernel) for kernel in KERNELS] == before
 
 
@@ -57,6 +59,7 @@ def test_it_starts_where_the_kernels_are_not_on_the_disk(tmp_path, monkeypatch):
     monkeypatch.setattr(kernel_folder, "write_folder", lambda: tmp_path)
     monkeypatch.setattr(ahead.os, "cpu_count", lambda: 2)
     monkeypatch.setattr(ahead.subprocess, "Popen", lambda command, **options: started.append(command))
+    monkeypatch.setattr(ahead, "_ships", lambda: False)
     ahead.compile_ahead()
     assert [command[-1] for command in started] == [ahead.CODE]
     lock = KernelLock(tmp_path / ahead.NAME)
@@ -64,9 +67,27 @@ def test_it_starts_where_the_kernels_are_not_on_the_disk(tmp_path, monkeypatch):
     ahead.compile_ahead()  # there is one already
     assert len(started) == 1
     lock.release()
+    monkeypatch.setattr(ahead, "_ships", lambda: True)
+    ahead.compile_ahead()
+    assert len(started) == 1
+    monkeypatch.setattr(ahead, "_ships", lambda: False)
     (tmp_path / f"{ahead.LAST}-0123.kernel").touch()
     ahead.compile_ahead()
     assert len(started) == 1
+
+
+def test_what_comes_with_the_package_counts_where_it_is_of_these_sources(tmp_path, monkeypatch):
+    monkeypatch.setattr(processor, "SHIPPED", tmp_path)
+    monkeypatch.setattr(processor, "shipped_level", lambda: "x86-64-v3")
+    folder = processor.folder_of("x86-64-v3")
+    folder.mkdir()
+    asked = []
+    monkeypatch.setattr(_sum_back, "is_there", lambda *arguments: asked.append(arguments) or len(asked) > 1)
+    assert not ahead._ships()
+    assert asked == []
+    (folder / f"{ahead.LAST}-0123.code").touch()
+    assert not ahead._ships()  # of other sources
+    assert ahead._ships()
 
 
 def test_it_ends_behind_the_kernel_in_which_the_first_process_ends(tmp_path, monkeypatch):

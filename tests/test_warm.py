@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,8 +16,11 @@ from truenorth.aiding.magnetometer import FIELD
 from truenorth.cli import warm as commands
 from truenorth.cli.warm import STUDIES, TASKS, run_task, warm
 from truenorth.core import kernel_folder
+from truenorth.core.processor import shipped_level
 from truenorth.simulation.scenario import shipped
 from truenorth.strapdown.level import mechanise_increments
+
+ROOT = Path(__file__).parents[1]
 
 
 def test_each_task_is_a_scenario_that_ships():
@@ -58,6 +66,16 @@ def test_without_a_folder_it_says_so(monkeypatch, capsys):
     monkeypatch.setattr(kernel_folder, "write_folder", lambda: None)
     warm()
     assert "no cache folder can be written to" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shipped_level(), reason="no kernels come with the package for this processor and Python")
+def test_the_demo_compiles_nothing(tmp_path):
+    """Where a kernel was edited, the one that comes with the package is of older sources: run make kernels."""
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
+    environment |= {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, str(ROOT / "examples/demo.py")], cwd=tmp_path, env=environment, check=True)
+    assert [file.name for file in (tmp_path / "cache").rglob("*.code")] == [], "run make kernels"
 
 
 @pytest.mark.slow

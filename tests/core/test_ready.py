@@ -1,6 +1,7 @@
 """Kernels from the disk that are called without Numba: the same answers, and Numba wherever it is needed."""
 
 import os
+import shutil
 import subprocess
 import sys
 from typing import NamedTuple
@@ -8,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from truenorth.core import ready
+from truenorth.core import processor, ready
 from truenorth.core.compiled import compiled
+from truenorth.core.kernel_folder import content_of, write
 from truenorth.core.kernel_store import machine_code_of
 from truenorth.core.machine_code import WRAPPER, CannotLinkError, MachineCode, can_link
 from truenorth.core.numba_part import numba_part
@@ -106,6 +108,42 @@ def test_a_second_process_gives_the_same_bits_and_errors_without_numba(tmp_path)
     assert second[where] == "ValueError before the first"
 
 
+SHIPPED = """
+from pathlib import Path
+from truenorth.core import processor
+processor.SHIPPED = Path({shipped!r})
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", processor.levels())
+def test_code_of_a_level_gives_the_bits_of_this_processor_from_an_empty_cache(tmp_path, monkeypatch, level):
+    (tmp_path / "plugin_ready.py").write_text(KERNELS)
+    own = said(tmp_path)
+    of_level = {processor.NAME: level, processor.FEATURES: ""}
+    made = said(tmp_path, XDG_CACHE_HOME=str(tmp_path / level), **of_level)
+    monkeypatch.setattr(processor, "SHIPPED", tmp_path / "kernels")
+    folder = processor.folder_of(level)
+    folder.mkdir(parents=True)
+    for file in (tmp_path / level).rglob("*.code"):
+        shutil.copy(file, folder)
+    monkeypatch.setitem(globals(), "CALLS", SHIPPED.format(shipped=str(tmp_path / "kernels")) + CALLS)
+    empty = tmp_path / "empty"
+    first = said(tmp_path, XDG_CACHE_HOME=str(empty), **of_level)
+    where = own.index("True")
+    assert first[where] == "False"
+    for lines in (own, made, first):
+        del lines[where]
+    assert own == made == first
+    assert [file.name for file in empty.rglob("*.code") if "mixed" in file.name] == []
+    (tmp_path / "plugin_ready.py").write_text(
+        KERNELS.replace("room[parts.at], parts.at + 1", "room[parts.at], parts.at + 2")
+    )
+    edited = said(tmp_path, XDG_CACHE_HOME=str(empty), **of_level)
+    assert edited != own
+    assert [file.name for file in empty.rglob("*.code") if "mixed" in file.name] != []
+
+
 class Point(NamedTuple):
     x: float
 
@@ -184,6 +222,38 @@ def code():
     summed.dispatcher(np.ones(3))
     (kernel,) = summed.dispatcher.overloads.values()
     return machine_code_of(kernel)
+
+
+def test_the_package_is_asked_where_the_cache_has_nothing(code, tmp_path, monkeypatch):
+    monkeypatch.setattr(processor, "SHIPPED", tmp_path)
+    monkeypatch.setattr(processor, "shipped_level", lambda: "x86-64-v3")
+    monkeypatch.setattr(ready, "folders", lambda: (tmp_path,))
+    name = ready.name_of(summed.py_func, summed.options, (np.ones(3),))
+    assert name.kept != name.shipped
+    assert not ready.is_there(name)
+    assert ready.found(name, bytes) is None
+    processor.folder_of("x86-64-v3").mkdir()
+    (file,) = name.in_package()
+    write(file, code)
+    assert ready.is_there(name)
+    assert ready.found(name, lambda content: ready.function_of(summed.py_func, content))(np.ones(3)) == 3.0
+    write(tmp_path / name.kept, b"of the cache")
+    assert ready.found(name, bytes) == b"of the cache"
+    (tmp_path / name.kept).unlink()
+    file.write_bytes(file.read_bytes()[:-1])
+    assert ready.found(name, bytes) is None
+
+
+@pytest.mark.skipif(
+    not processor.shipped_level(), reason="no kernels come with the package for this processor and Python"
+)
+def test_what_comes_with_the_package_is_whole():
+    """Also what is of older sources, which nobody calls."""
+    files = list(processor.folder_of(processor.shipped_level()).iterdir())
+    assert len(files) > 20
+    for file in files:
+        code = MachineCode(content_of(file), numba_part("_dynfunc").Environment({}))
+        assert code.function(WRAPPER) > 0
 
 
 def test_machine_code_is_linked_beside_numbas(code):

@@ -52,12 +52,15 @@ def messages() -> set[str]:
     for file in sorted(HOME.rglob("*.py")):
         if file.relative_to(HOME).parts[0] in NOT_SPOKEN:
             continue
-        tree = ast.parse(file.read_text(encoding="utf-8"))
+        text = file.read_text(encoding="utf-8")
+        if not RAISED.search(text):
+            continue
+        nodes = list(ast.walk(ast.parse(text)))
         named: dict[str, list[ast.expr]] = {}
-        for node in ast.walk(tree):
+        for node in nodes:
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
                 named.setdefault(node.targets[0].id, []).append(node.value)
-        for node in ast.walk(tree):
+        for node in nodes:
             if isinstance(node, ast.Call) and RAISED.fullmatch(_name(node.func)):
                 said = node.args[2:3] if _name(node.func) == "Finding" else node.args[:1]
                 found |= {_template(pieces) for value in said for pieces in _pieces(value, named) if any(pieces)}

@@ -37,11 +37,31 @@ def compile_ahead() -> None:
     folder = write_folder()
     if folder is None or (os.cpu_count() or 1) < 2 or next(folder.glob(f"{LAST}-*.kernel"), None) is not None:
         return
-    if KernelLock(folder / NAME).taken():  # of another first command
+    if KernelLock(folder / NAME).taken() or _ships():  # of another first command
         return
     silent = subprocess.DEVNULL
     process = subprocess.Popen([sys.executable, "-c", CODE], stdin=subprocess.PIPE, stdout=silent, stderr=silent)
     _running.append(process)
+
+
+def _ships() -> bool:
+    """Whether the last kernel comes with the package, of these sources and for this processor."""
+    from truenorth.core.processor import folder_of, shipped_level
+
+    level = shipped_level()
+    if not level or next(folder_of(level).glob(f"{LAST}-*"), None) is None:
+        return False
+    from truenorth.alignment.matched import _sum_back
+
+    return _sum_back.is_there(*_of_last())
+
+
+def _of_last() -> tuple[Any, ...]:
+    """Arguments of the kinds that the last kernel is called with."""
+    import numpy as np
+
+    cube = np.zeros((1, 1, 1))
+    return (*[cube] * 5, np.zeros((1, 1)), cube, np.zeros(1, dtype=np.int64), cube, cube)
 
 
 _running: list[subprocess.Popen[bytes]] = []  # held: the pipe would be closed with the object

@@ -59,7 +59,7 @@ class Kernel(KernelSource):
             ready.keep(name, machine_code_of(self.dispatcher.overloads[self._types(arguments)]), use)
         return result
 
-    def _file(self, arguments: tuple[Any, ...]) -> str | None:
+    def _file(self, arguments: tuple[Any, ...]) -> ready.Name | None:
         """The name of the file of machine code; none for calls that leave out arguments."""
         return ready.name_of(self.py_func, self.options, arguments) if len(arguments) == self._count else None
 

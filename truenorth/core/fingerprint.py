@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from enum import Enum
 from functools import cache
 from importlib.util import find_spec
@@ -32,8 +31,6 @@ from truenorth.core.vectors import VectorStep
 Remembered = type(cache(len))
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
-PROCESSOR = Path("/proc/cpuinfo")
-SAID = ("vendor_id", "cpu family", "model", "model name", "stepping", "flags")  # of what a processor is, there
 
 
 class UnknownValueError(Exception):
@@ -64,8 +61,10 @@ def fingerprint(function: Callable[..., Any], options: dict[str, Any], signature
     return hashlib.sha256("\n".join(text).encode()).hexdigest()
 
 
-def fingerprint_of_call(function: Callable[..., Any], options: dict[str, Any], arguments: tuple[Any, ...]) -> str:
-    """Digest of all that the machine code for a call with such arguments is made from, processor and Numba's version included.
+def fingerprints_of_call(
+    function: Callable[..., Any], options: dict[str, Any], arguments: tuple[Any, ...], processors: Iterable[str]
+) -> list[str]:
+    """Digests of all that the machine code for a call with such arguments is made from, Numba's version included.
 
     Parameters
     ----------
@@ -73,6 +72,8 @@ def fingerprint_of_call(function: Callable[..., Any], options: dict[str, Any], a
         As of :func:`fingerprint`.
     arguments : tuple
         Numbers, arrays of numbers, and tuples of these; their kinds count, not their values.
+    processors : iterable of str
+        What the code is made for: a digest for each.
 
     Raises
     ------
@@ -83,7 +84,13 @@ def fingerprint_of_call(function: Callable[..., Any], options: dict[str, Any], a
     sources.see(function)
     text = [_surroundings(), _of_options(options), *(_of_argument(argument, sources) for argument in arguments)]
     text += sources.walk()
-    return hashlib.sha256("\n".join(text).encode()).hexdigest()
+    common = hashlib.sha256("\n".join(text).encode())
+    digests = []
+    for processor in processors:
+        digest = common.copy()
+        digest.update(processor.encode())
+        digests.append(digest.hexdigest())
+    return digests
 
 
 @cache
@@ -101,17 +108,14 @@ def _tools() -> str:
 
 @cache
 def _surroundings() -> str:
-    """Versions and processor, as they are found without loading Numba; its settings have their defaults."""
+    """Versions, as they are found without loading Numba; its settings have their defaults."""
     versions = []
     for name in ("numba", "llvmlite"):
         found = find_spec(name)
         if found is None or found.origin is None:
             raise UnknownValueError(f"{name} is not installed")
         versions.append(Path(found.origin).with_name("_version.py").read_text(encoding="utf-8"))
-    with PROCESSOR.open("rb", buffering=0) as file:  # of many processors the first is enough
-        lines = os.read(file.fileno(), 8192).decode("utf-8", "replace").split("\n\n")[0].splitlines()
-    processor = [line for line in lines if line.partition(":")[0].strip() in SAID]
-    return repr((sys.implementation.name, sys.version_info[:2], np.__version__, versions, processor))
+    return repr((sys.implementation.name, sys.version_info[:2], np.__version__, versions))
 
 
 class _Sources:

@@ -57,17 +57,21 @@ def write_folder() -> Path | None:
 
 
 def read(path: Path) -> bytes | None:
-    """What a file holds; None where it is missing, or was torn by a loss of power."""
+    """What a file of the cache holds; None where it is missing, or was torn by a loss of power."""
+    content = content_of(path)
+    with suppress(OSError):  # gone since, or of another user
+        if content is not None and time.time() - path.stat().st_mtime > DAY:
+            os.utime(path)  # used today: the last to be pruned
+    return content
+
+
+def content_of(path: Path) -> bytes | None:
+    """The same, without a note that it was used."""
     try:
         content = path.read_bytes()
     except OSError:
         return None
-    if hashlib.sha256(content[SUM:]).digest() != content[:SUM]:
-        return None
-    with suppress(OSError):  # gone since, or of another user
-        if time.time() - path.stat().st_mtime > DAY:
-            os.utime(path)  # used today: the last to be pruned
-    return content[SUM:]
+    return content[SUM:] if hashlib.sha256(content[SUM:]).digest() == content[:SUM] else None
 
 
 def write(path: Path, content: bytes) -> None:
