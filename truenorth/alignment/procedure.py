@@ -145,11 +145,10 @@ def align_base(
     chosen, why = _choose(method, task)
     tell(f"aligning: {chosen}")
     means = check_means(task.means, position.lat, task.gravity)
-    turned = False
     if is_blind(task.motion, means) or is_lost(task, means, spec, heading_limit):
         asked = "" if method == "auto" else f"{method} was asked for, but "
         chosen, why, found = "analytic", f"{asked}{NO_NORTH}", _Found(*level_from_means(task, spec))
-    elif turned := (method == "auto" and chosen != "analytic" and turns_blindly(task, spec)):
+    elif method == "auto" and chosen != "analytic" and turns_blindly(task, spec):
         chosen, why, found = "kalman", TURNS_BLINDLY, _align_turning(task, spec)
     elif chosen == "analytic":
         found = _Found(*from_means(task, spec))
@@ -157,7 +156,7 @@ def align_base(
         found = _align_inertial(task, spec, chosen, sound)
         if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit):
             chosen, why, found = "analytic", NO_NORTH, _Found(*level_from_means(task, spec))
-        elif turned := (method == "auto" and spec is None and was_blind(task, found.answer.imu)):
+        elif method == "auto" and spec is None and was_blind(task, found.answer.imu):
             chosen, why, found = "kalman", TURNS_BLINDLY, _align_turning(task, spec)
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
