@@ -163,7 +163,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
         )
         R = white_variance(mean_velocity(log.integrals, C, lat, alt))
         everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
-        noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
+        noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES, grows_after=ROUND)
         last = settle(log, partial(_by_level, noise), in_sigmas(LEVEL), most=LAST if whole else ROUND)
         if whole:
             return FineAlignment.of(log, last, prior.sensors, np.sqrt(noise.R[0]))
