@@ -222,10 +222,11 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     used, where = (infer_turning(task), INFERRED) if spec is None else (spec, f"specification {spec.name!r}")
     fine = turning_align(task, used, np.array([task.epoch.row]))
     answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
+    apart = fine.scatter * np.eye(3)
     answer = replace(
         answer,
-        phi_covariance=without_heading(answer.phi_covariance),
-        phi_floor=without_heading(answer.phi_floor),
+        phi_covariance=without_heading(answer.phi_covariance + apart),
+        phi_floor=without_heading(answer.phi_floor + apart),
         pays_until=None,
         handover=None,
     )

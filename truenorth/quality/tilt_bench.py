@@ -83,7 +83,7 @@ class TiltBench:
         in axes that do not turn it turns with the IMU, as gravity does in the IMU's, and passes for gyros that turn too far.
 
         All is averaged over half a second: the angular acceleration that an arm is fitted to has the noise of the gyros in it,
-        differentiated. On a rope of 15 m that of gyros of .05 deg/sqrt(h) made the arm too short, and their scale factors 3 % wrong.
+        differentiated. On a rope of 15 m that of gyros of .05 deg/sqrt(h) made the arm too short, and scale factors 3 % wrong.
         """
         columns, C = self._columns(theta)
         up = (C @ self.force[..., None])[..., 0]
