@@ -48,5 +48,5 @@ def test_biases_that_wander_as_promised_do_not_step(vehicle, seed, run):
     rng = np.random.default_rng([seed, run, 9])
     true = vehicle(rng, 300.0)
     answer = align(sensed(rng, true, imu_spec("tactical")), Position(*true.place.mean(axis=0).tolist()))
-    assert answer.status in ("aligned", "level_only")
+    assert answer.status != "inconsistent"
     assert not [item for item in answer.evidence if item.key == "bias.accel_steps" and item.kind == "bounded"]
