@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.honesty.foreign import sensed
+from benchmarks.honesty.vehicles import parked
 from tests.runs import few_and_all, some
 from truenorth import align
 from truenorth.campaign.fault_benches import BENCHES, misses
@@ -107,6 +109,15 @@ def test_people_who_get_in_and_out_are_no_drift(run):
         2
     ]  # tilted by less than an arc minute of that
     assert abs(heading) < 4.0 * answer.euler_sigma[0]
+
+
+@pytest.mark.slow
+def test_one_who_gets_in_while_gusts_rock_a_car_is_no_drift():
+    """Seed 9021, run 17: gusts hid the step from a walk that was fitted to the tilts, and an accelerometer drifted by 956 ug."""
+    rng = np.random.default_rng([9021, 17, 9])
+    car = parked(rng, 300.0)
+    answer = align(sensed(rng, car, imu_spec("navigation")), Position(*car.place.mean(axis=0).tolist()), "navigation")
+    assert answer.status == "aligned"
 
 
 def test_a_ramp_of_the_east_gyro_on_a_still_base_shows_in_its_rate() -> None:

@@ -28,16 +28,19 @@ def waves(rng, time, size):
     return size / np.sqrt(6.0) * np.cos(w * time[:, None] + rng.uniform(0.0, 6.28, 12)).sum(axis=1)
 
 
-def floating(seed, hides=0.0, duration=300.0, noise=NOISE):
+def floating(seed, hides=0.0, duration=300.0, noise=NOISE, above=0.0):
     """A base that rolls by 3 deg and heaves, and is pushed level just as gyros late by `hides` lay gravity askew.
 
-    The log of a sound IMU, and its attitude at the start.
+    The log of a sound IMU, `above` metres above the point that neither rises nor sinks, and its attitude at the start.
     """
     rng = np.random.default_rng(seed)
     edge = STEP * np.arange(round(duration / STEP) + 1)
     middle = 0.5 * (edge[1:] + edge[:-1])
     tilts = [waves(np.random.default_rng([seed, 1]), edge - d, np.radians(3.0)) for d in (0.0, hides)]
     heave = waves(rng, middle, 0.5)
+    x, y = tilts[0], 0.3 * tilts[0]
+    sinks = above * np.cos(np.hypot(x, y))
+    heave += np.gradient(np.diff(sinks) / STEP, STEP)
     zero = np.zeros_like(edge)
     C, late = (exp(np.stack([x, 0.3 * x, zero], axis=1)) for x in tilts)
     start = C[0]
@@ -66,6 +69,16 @@ def test_a_push_in_step_with_the_tilt_is_no_delay(seed):
     delay = heave_of(*floating(seed, hides=0.2)).delay
     assert delay.ratio < 12.0
     assert abs(delay.size) < 4.0 * delay.sigma < 0.2
+
+
+@pytest.mark.parametrize("above", [-8.0, 8.0])
+def test_an_arm_that_sinks_as_its_base_tilts_is_no_delay(above):
+    """Of 8 m at 3 deg: 2 mm/s, as slow as the groups of waves. Ships were refused for gyros .07 s early."""
+    found = [heave_of(*floating(seed, hides=0.2, above=above)).delay for seed in range(4)]
+    assert max(delay.ratio for delay in found) < 12.0
+    late = [floating(seed, hides=0.2, above=above) for seed in range(4)]
+    seen = [heave_of(gyros_behind(record, 0.2), start).delay for record, start in late]
+    assert min(delay.ratio for delay in seen) > 25.0
 
 
 def test_delays_of_quiet_seas_are_as_uncertain_as_their_sigma_says():

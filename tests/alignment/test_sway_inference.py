@@ -5,9 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.honesty import vehicles
+from benchmarks.honesty.foreign import sensed
 from tests import recordings
 from tests.alignment.test_in_motion_recordings import FOG
 from truenorth.alignment import align
+from truenorth.core.position import Position
+from truenorth.records.specs import imu_spec
 
 
 @pytest.mark.parametrize("imu", [None, FOG])
@@ -35,3 +39,14 @@ def test_a_piece_that_is_missing_is_seen_though_the_noise_of_the_base_has_grown_
     cut = replace(record, time=time, gyro=record.gyro[rows], accel=record.accel[rows])
     assert align(cut, position, FOG).status == "inconsistent"
     assert align(record.between(record.time[0] - record.interval, 53.0), position, FOG).status == "aligned"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("vehicle", "seed", "run"), [(vehicles.raft, 77100, 2), (vehicles.gondola, 50210, 8)])
+def test_biases_that_wander_as_promised_do_not_step(vehicle, seed, run):
+    """A fit of the noise that knows no wander named steps of 1230 and 147 ug, with likelihood ratios of 39 and 47."""
+    rng = np.random.default_rng([seed, run, 9])
+    true = vehicle(rng, 300.0)
+    answer = align(sensed(rng, true, imu_spec("tactical")), Position(*true.place.mean(axis=0).tolist()))
+    assert answer.status != "inconsistent"
+    assert not [item for item in answer.evidence if item.key == "bias.accel_steps" and item.kind == "bounded"]

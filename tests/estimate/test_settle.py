@@ -41,3 +41,24 @@ def test_what_goes_on_one_way_is_not_damped():
     last = settle(log, lambda system: Found(np.full(2, next(steps))), lambda found: float(found.end[0]), most=9)
     assert last.passes == 5
     assert np.allclose(log.s, [1.0 - 1.5, -3e-6 - 1.5])
+
+
+@pytest.mark.parametrize("share", [1.5, 2.3])
+def test_passes_that_go_round_come_to_rest(share):
+    """Two states that turn each other: steps never go straight back, and undamped they end in a circle for ever."""
+
+    class Round:
+        s = np.array([1.0, 0.3])
+
+        def linearise(self):
+            # Far from rest a pass finds the error turned, and no more than a step of one.
+            turned = np.array([self.s[0] - share * self.s[1], self.s[1] + share * self.s[0]])
+            return turned / max(1.0, float(np.linalg.norm(turned)))
+
+        def correct(self, x):
+            self.s = self.s - x
+
+    log = Round()
+    last = settle(log, Found, lambda found: float(np.abs(found.end).max()), most=200)
+    assert last.moved < 0.02
+    assert last.passes < 200

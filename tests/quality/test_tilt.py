@@ -10,6 +10,7 @@ from truenorth.core.position import Position
 from truenorth.quality.regimes import motion_summary
 from truenorth.quality.tilt import IDENTITY, Tilt, check_tilt
 from truenorth.quality.tilt_bench import changes
+from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
 
 
@@ -145,3 +146,36 @@ def test_late_gyros_of_an_imu_that_spins_turn_heading():
     answer = BENCHES["rotary"].align(_late(0.05)(inputs))
     assert any(item.key == "tilt.gyros_late" and item.effect.heading > 0.005 for item in answer.evidence)
     assert answer.status == "inconsistent" or float(np.abs(misses(answer, truth)["heading"]).max()) < 3.0
+
+
+def hanging(seed, scale=1.0):
+    """An IMU at the end of a rope of 12 m that swings by 3 deg in gusts, its gyros of .05 deg/sqrt(h)."""
+    rng = np.random.default_rng(seed)
+    step, rope, count = 0.02, 12.0, 10000
+    w = np.sqrt(9.81 / rope)
+    drive = rng.standard_normal((2, count)) * np.sqrt(4.0 * 0.02 * w / step)
+    swing = np.zeros((2, count))  # by its equation of motion, x'' = -w^2 x - 2 z w x' + n
+    rate = np.zeros((2, count))
+    for k in range(1, count):
+        rate[:, k] = rate[:, k - 1] + step * (drive[:, k] - w**2 * swing[:, k - 1] - 2.0 * 0.02 * w * rate[:, k - 1])
+        swing[:, k] = swing[:, k - 1] + step * rate[:, k]
+    swing *= np.radians(3.0) / swing.std()
+    gyro = np.zeros((count, 3))
+    gyro[1:, :2] = np.diff(swing, axis=1).T / step
+    noise = 1.5e-5 / np.sqrt(step) * rng.standard_normal((count, 3))
+    angular = np.gradient(gyro, step, axis=0)
+    level = np.sin(swing)
+    force = np.zeros((count, 3))
+    # Gravity in the body, and what the rope's length makes of the angular acceleration; they cancel but for its damping.
+    force[:, 0] = -9.81 * level[1] - rope * angular[:, 1]
+    force[:, 1] = 9.81 * level[0] + rope * angular[:, 0]
+    force[:, 2] = 9.81 * np.cos(swing[0]) * np.cos(swing[1]) + rope * (gyro[:, 0] ** 2 + gyro[:, 1] ** 2)
+    force += 5e-4 / np.sqrt(step) * rng.standard_normal((count, 3))
+    return ImuRecord(step * np.arange(1, count + 1), scale * gyro + noise, force, "rates")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_of_gyros_that_an_arm_multiplies_is_no_scale_factor(seed):
+    """Errors in what an arm is fitted to made it too short: gyros of gondolas were 3 % wrong, at nine sigmas, and are not."""
+    assert check_tilt(hanging(seed)).scale[:2] == pytest.approx([0.0, 0.0], abs=0.01)
+    assert check_tilt(hanging(seed, 1.05)).scale[:2] == pytest.approx([0.05, 0.05], abs=0.015)

@@ -175,22 +175,27 @@ def gravity_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
 
     A tilt rate ``b / g`` about east looks like a heading that is off by ``b / (g w_ie cos L)``: filters that let the base move
     take a drift for a tilt. No log of gyros and accelerometers tells them apart, and a base that is still hardly tilts. One
-    whose people get in and out does, in steps that the gyros see: such a walk has a slope of its own, which shows no drift.
+    whose people get in and out does, in steps that the gyros see: what they saw is taken off the forces (:func:`tilted`).
     """
     motion = task.motion
     count = len(motion.time) // DRIFT_BLOCK
-    if motion.overall != "still" or count < FEWEST_BLOCKS:
+    turns = motion.fraction("rotating") > 0.0 or passing_turns(motion).any()
+    if motion.overall != "still" or count < FEWEST_BLOCKS or turns:  # an IMU that was turned has no one attitude
         return []
     force = (motion.specific_force @ C_nb.T)[: count * DRIFT_BLOCK, :2].reshape(count, DRIFT_BLOCK, 2).mean(axis=1)
     time = DRIFT_BLOCK * (np.arange(count) - 0.5 * (count - 1.0))  # s
+    tilt, steady = tilted(task, C_nb)
+    force -= task.gravity * tilt
     b = time @ force / (time @ time)
     left = force - force.mean(axis=0) - np.outer(time, b)
     variance = np.sum(left**2, axis=0) / ((count - 2.0) * (time @ time))
     span = float(motion.time[-1] - motion.time[0])
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
-    # Two values of a bias that wanders, far apart, differ by its instability times sqrt(2).
-    walked = task.gravity**2 * tilt_slopes(task, C_nb)
-    ratio = float(np.sum((span * b) ** 2 / (span**2 * (variance + walked) + 2.0 * instability**2)))
+    wanders = max(spec.gyro_bias_instability, usual("gyro", "bias_instability", spec.gyro_random_walk))
+    # Two values of a bias that wanders, far apart, differ by its instability times sqrt(2). A gyro that wanders tilts what it
+    # carries.
+    carried = task.gravity**2 * (steady**2 + wanders**2)
+    ratio = float(np.sum((span * b) ** 2 / (span**2 * (variance + carried) + 2.0 * instability**2)))
     moved = span * float(np.linalg.norm(b))  # m/s^2
     if ratio <= limit("drift"):
         return []
@@ -200,23 +205,29 @@ def gravity_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
     return [Evidence("bias.gravity_drifts", figures, "known", effect, ("still_part",))]
 
 
-def tilt_slopes(task: Task, C_nb: Array) -> Array:
-    """(2,) variance of the slope that the base's own walk, as the gyros see it, gives to forces east and north, (rad/s)^2.
+def tilted(task: Task, C_nb: Array) -> tuple[Array, Array]:
+    """What a base tilted by besides a steady turn, as its gyros saw it, and one sigma of that turn.
 
-    A constant rate is that of the earth, or of a tilt that nobody can tell from it, and is left out. Of means over blocks the
-    differences ``d`` of a walk of density q have the variance ``q T`` and no correlation; a rocking about a place has -1/2 of its
-    variance from one to the next. The line through a walk over ``S`` has a slope of variance ``6 q / (5 S)``.
+    A constant rate is that of the earth, or of a tilt that nobody can tell from it: the median of the differences between
+    blocks, of which people who get in and out make few. A mean would take each step for a steady turn of the whole log, and a walk
+    fitted to the differences drowns in the rocking of gusts.
+
+    Returns
+    -------
+    tilt : (B, 2) array, rad
+        Level force east and north by gravity, in each block of `DRIFT_BLOCK` seconds.
+    sigma : (2,) array, rad/s
     """
-    rate = task.motion.rate @ C_nb.T
-    angle = np.cumsum(rate - rate.mean(axis=0), axis=0)
+    angle = np.cumsum(task.motion.rate @ C_nb.T, axis=0)
     count = len(angle) // DRIFT_BLOCK
-    tilt = (
-        np.stack([angle[:, 1], -angle[:, 0]], axis=1)[: count * DRIFT_BLOCK].reshape(count, DRIFT_BLOCK, 2).mean(axis=1)
-    )
+    level = np.stack([-angle[:, 1], angle[:, 0]], axis=1)
+    tilt = level[: count * DRIFT_BLOCK].reshape(count, DRIFT_BLOCK, 2).mean(axis=1)
     d = np.diff(tilt, axis=0)
-    d -= d.mean(axis=0)
-    walk = np.maximum(np.mean(d**2, axis=0) + 2.0 * np.mean(d[1:] * d[:-1], axis=0), 0.0)
-    return np.asarray(1.2 * walk / (count * DRIFT_BLOCK**2))
+    steady = np.median(d, axis=0)
+    scatter = np.median(np.abs(d - steady), axis=0) / 0.6745
+    # A median of normal values scatters by sqrt(pi/2) times what their mean does.
+    sigma = scatter * math.sqrt(0.5 * math.pi / len(d)) / DRIFT_BLOCK
+    return tilt - np.outer(np.arange(count), steady), sigma
 
 
 def _stays(step: Touch, time: Array, rate: Array) -> bool:

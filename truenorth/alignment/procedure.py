@@ -225,11 +225,12 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
     # The fit takes the arm from the axis: it leaves no motion. Where nothing says so, the IMU moves on as it did.
     moved = own_motion(fine.integrals, fine.C_n0_i, task.position.lat, task.position.alt, RECENT)
+    apart = fine.scatter * np.eye(3)
     answer = replace(
         answer,
         disturbance=np.maximum(answer.disturbance, moved),
-        phi_covariance=without_heading(answer.phi_covariance),
-        phi_floor=without_heading(answer.phi_floor),
+        phi_covariance=without_heading(answer.phi_covariance + apart),
+        phi_floor=without_heading(answer.phi_floor + apart),
         pays_until=None,
         handover=None,
     )

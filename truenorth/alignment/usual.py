@@ -24,13 +24,13 @@ def usual(sensor: str, what: str, random_walk: float) -> float:
     return math.exp(float(np.interp(math.log(max(random_walk, 1e-12)), walks, sizes)))
 
 
-def wandering_as_usual(noise: StaticModel) -> StaticModel:
-    """White noise as it is, and biases that wander as is usual of sensors with it.
+def wandering_as_usual(noise: StaticModel, *, promised: bool = False) -> StaticModel:
+    """White noise as it is, and biases that wander as is usual of sensors with it; `promised`: as much as presets promise.
 
     Biases of accelerometers that are taken for constants see the earth turn gravity: a wander of .4 ug was a tilt of .02 deg. A
     preset promises what most sensors keep: it is one sigma of the prior (:mod:`truenorth.alignment.noise`) above its centre.
     """
-    rate = math.sqrt(2.0 / CORRELATION_TIME) * math.exp(-PRIOR_WIDTH)
+    rate = math.sqrt(2.0 / CORRELATION_TIME) * (1.0 if promised else math.exp(-PRIOR_WIDTH))
     return replace(
         noise,
         gyro_rate_walk=rate * usual("gyro", "bias_instability", noise.gyro_random_walk),

@@ -94,18 +94,31 @@ class VelocityNoise:
         Whether the estimates of every epoch are wanted, or those of the last alone.
     coloured : bool
         Whether the variance covers a base that wanders slowly, too. It is larger then than the likeliest.
+    grows_after : int, optional
+        Passes after which the variance only grows. Whether innovations are coloured is a decision: taken anew in each pass it goes
+        to and fro with the attitude, and neither comes to rest. The larger variance is right for both.
     """
 
     def __init__(
-        self, R: Array, parts: Sequence[NDArray[np.bool_]], most: int, *, history: bool = True, coloured: bool = True
+        self,
+        R: Array,
+        parts: Sequence[NDArray[np.bool_]],
+        most: int,
+        *,
+        history: bool = True,
+        coloured: bool = True,
+        grows_after: int | None = None,
     ) -> None:
         self.R, self.parts, self.most, self.history = R, parts, most, history
+        self.passes, self.grows_after = 0, grows_after
         self.colours = (False, True) if coloured else (False,)
 
     def __call__(self, quiet: LinearSystem) -> Filtered:
         """Filter a system that holds the variance of the quietest base so far."""
         system = self._with_motion(quiet)
         estimates = self._filtered(system)
+        self.passes += 1
+        grows = self.grows_after is not None and self.passes > self.grows_after
         for colour in self.colours:
             for _ in range(self.most):
                 R, same = self.R.copy(), True
@@ -113,7 +126,8 @@ class VelocityNoise:
                     every = slice(None) if len(self.parts) == 1 and part.all() else part
                     nu, covariance = estimates.innovation[every], estimates.innovation_covariance[every]
                     before = self.R[every][0]
-                    R[every], expected = _variance_of(nu, covariance, before, colour)
+                    found, expected = _variance_of(nu, covariance, before, colour)
+                    R[every] = np.maximum(found, before) if grows else found
                     # The vertical carries no attitude.
                     same &= bool(np.all(np.abs(R[every][0] - before)[:2] < SAME_NOISE * expected[:2]))
                 if same:

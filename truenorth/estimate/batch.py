@@ -23,6 +23,9 @@ CONVERGED = 0.02  # a pass that moves no angle by more than this part of its sig
 ROUGHLY = 0.3  # the same part, above which the answer is not to be trusted
 LITTLE = 0.7  # a pass that moves back by more than this part of the one before comes to rest late or never
 BACK = -0.5  # likeness of two steps, from 1 (the same) to -1 (opposite), that go to and fro
+ROUNDS = 8  # passes, within which those that come to rest come nearer to it by ...
+NEARER = 0.8  # ... this part
+LEAST = 1.0 / 16.0  # of a step: with less they do not come that much nearer in so many, wherever they go
 
 
 S_co = TypeVar("S_co", covariant=True)
@@ -98,7 +101,9 @@ def settle(
 
     Where the passes go to and fro, each about as far as the one before, half of a step is taken from there on (damped
     Gauss-Newton: J. Nocedal and S. Wright, Numerical Optimization, 2nd ed., section 10.3; how we see it is ours): the heading of
-    a cheap IMU that turns is a convention, and what shows it bends within the tens of degrees that a pass moves it by.
+    a cheap IMU that turns is a convention, and what shows it bends within the tens of degrees that a pass moves it by. So it is
+    where they go round in more than two, or anyhow, and come no nearer in `ROUNDS` passes: of a swing of tens of degrees they
+    went round in four for ever.
 
     Parameters
     ----------
@@ -114,6 +119,7 @@ def settle(
         Passes.
     """
     passes, share, before, last = 0, 1.0, math.inf, np.zeros(0)
+    nearest, since = math.inf, 0
     while True:
         passes += 1
         found = estimate(log.linearise())
@@ -121,8 +127,9 @@ def settle(
         if passes >= most or (passes >= least and by < enough):
             return Settled(found, passes, by)
         end = np.array(found.end)
-        if by > LITTLE * before and _likeness(end, last) < BACK:
-            share *= 0.5
+        nearest, since = (by, 0) if by < NEARER * nearest else (nearest, since + 1)
+        if (since >= ROUNDS and share > LEAST) or (by > LITTLE * before and _likeness(end, last) < BACK):
+            share, nearest, since = 0.5 * share, by, 0
         before, last, end = by, end, share * end
         del found  # a pass takes memory: none of it stays for the next
         log.correct(end)

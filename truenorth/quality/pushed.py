@@ -11,6 +11,8 @@ level force is fitted once more with ``K = K0 + K1 jw + K2 (jw)^2``: tilt, its r
 this explains beyond the delay is the base's own. Of sound buoys, rafts and ships at the quay it was .12 to thousands of times the
 squares that the delay explains, of late gyros on swaying ships and gondolas 0 to .2, as a rule .01.
 
+So it is with scale factors: gyros that turn too far leave nothing that goes with the tilt once they are put right, a push does.
+
 A push of the same shape as a delay hides one, or makes one seem: no record of gyros and accelerometers tells the two apart. Where a
 push is there, a delay is in sigma, with all that it may have hidden, and refuses no log.
 """
@@ -23,38 +25,38 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.quality.tilt_bench import AXES, TiltBench, shifted, squares_left
+from truenorth.quality.tilt_bench import AXES, TiltBench, squares_left
 
 Array = NDArray[np.float64]
 
 
 class Push(NamedTuple):
-    """Of the sea in step with a base's tilt, against a delay of its gyros."""
+    """Of the sea in step with a base's tilt, against what may be wrong of its gyros."""
 
-    share: float  # squares of level force that go with the tilt and are no delay, by those that the delay explains
+    share: float  # squares of level force that go with the tilt and are not this, by those that it explains
     level: float  # m/s^2, RMS along an axis of the level force that the gyros as given do not explain
 
 
 NO_PUSH = Push(0.0, 0.0)
 
 
-def push_in_step(bench: TiltBench, theta: Array, delay: float) -> Push:
-    """What goes with the tilt of a base beyond a delay of its gyros.
+def push_in_step(bench: TiltBench, theta: Array, right: Array) -> Push:
+    """What goes with the tilt of a base beyond a delay, or other scale factors, of its gyros.
 
     Parameters
     ----------
     theta : (P, L, 3) array, rad
         Turns of the base, as its gyros show them.
-    delay : float, s
-        By which these may be late.
+    right : (P, L, 3) array, rad
+        The same with what may be wrong of them put right.
 
     Returns
     -------
     Push
-        Its share is infinite where the delay explains nothing.
+        Its share is infinite where what is put right explains nothing.
     """
     given, _ = _left(bench, theta)
-    left, alone = _left(bench, shifted(theta, delay / bench.interval))
+    left, alone = _left(bench, right)
     share = (left - alone) / (given - left) if given > left else math.inf
     return Push(share, math.sqrt(1.5 * given / theta.size))
 

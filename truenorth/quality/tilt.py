@@ -183,7 +183,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
     shift = min(squares, key=squares.__getitem__)
     if squares[shift] < min(0.98 * best**2, 0.5 * given**2):
         delay, small = _lowest(squares, shift)
-        pushed = push_in_step(bench, theta, delay) if may_be_pushed else NO_PUSH
+        pushed = push_in_step(bench, theta, shifted(theta, delay / interval)) if may_be_pushed else NO_PUSH
         tilt = abs(delay) * bench.rate(theta)
         turn = abs(delay) * bench.rate_up(theta)
         return Tilt(given, unturned, math.sqrt(small), IDENTITY, delay, 0.0, tilt, turn=turn, pushed=pushed)
@@ -201,7 +201,9 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
     if wrong.any():
         half, whole = (theta / np.maximum(1.0 + part * wrong, 0.1) for part in (0.5, 1.0))
         better = bench.left(whole) < bench.left(half) < given
-        if not better or may_be_pushed:
+        # An arm takes up most of a scale error, and of a push as well: a base that is not rough may be pushed all the same.
+        pushed_so = C_sb is None and push_in_step(bench, theta, whole).share > limit("pushed in step")
+        if not better or may_be_pushed or pushed_so:
             sigma_scale = np.full(3, np.inf)
         # Of an indexer the angles must say so, too: the waves that push its base leave some of that in the tilt as it spins.
         by_angles = bench.scales_by_angles(theta)
@@ -209,7 +211,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
             sigma_scale = np.where(by_angles * wrong < 0.5 * wrong**2, np.inf, sigma_scale)
     each = little[4:], sigma[4:]
     turn = abs(late) * bench.rate_up(theta)
-    pushed = push_in_step(bench, theta, late) if may_be_pushed else NO_PUSH
+    pushed = push_in_step(bench, theta, shifted(theta, late / interval)) if may_be_pushed else NO_PUSH
     one_delay = given, unturned, best, axes, late, float(sigma[0]), tilt
     return Tilt(*one_delay, scale, sigma_scale, turns, len(theta), *each, turn, pushed)
 

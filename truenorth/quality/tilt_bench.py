@@ -13,6 +13,7 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 Array = NDArray[np.float64]
 
 AXES = np.eye(3)
+AVERAGED = 5  # cells of a tenth of a second: gyros differentiated over as many have a 25th of the noise power
 MOST_OF_IT = 0.5  # of the squares of the turns about an axis, that an indexer makes
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
 EDGES = np.array([[25.0, -23.0, 13.0, -3.0], [3.0, 13.0, -5.0, 1.0]]) / 12.0
@@ -23,10 +24,14 @@ class TiltBench:
 
     def __init__(self, force: Array, interval: float, C_sb: Array | None, accel_bias: float = 0.0) -> None:
         self.force, self.interval, self.C_sb, self.accel_bias = force, interval, C_sb, accel_bias
-        self.basis = _line(force.shape[1])
 
     def carried(self, theta: Array) -> tuple[Array, Array]:
         """Force and the arm's columns (P L 3, 4) in axes that do not turn, pieces freed of a line, and ``C_is`` (P, L, 3, 3)."""
+        columns, C = self._columns(theta)
+        return self.freed(columns).reshape(-1, 4), C
+
+    def _columns(self, theta: Array) -> tuple[Array, Array]:
+        """The same force and columns (P, L, 3, 4), with their lines."""
         C = np.stack([dcm_from_quaternion(integrate_attitude(piece)) for piece in theta])
         C = 0.5 * (C[:, 1:] + C[:, :-1])  # in the middle of a cell, to second order in its turn
         base = C if self.C_sb is None else C @ self.C_sb
@@ -35,8 +40,7 @@ class TiltBench:
             w = self._turning(base)
             w = np.concatenate([w[:, :1], 0.5 * (w[:, 1:] + w[:, :-1]), w[:, -1:]], axis=1)
         W = skew(changes(w) / self.interval) + skew(w) @ skew(w)
-        columns = np.concatenate([C @ self.force[..., None], base @ W], axis=3)
-        return self.freed(columns).reshape(-1, 4), C
+        return np.concatenate([C @ self.force[..., None], base @ W], axis=3), C
 
     def _turning(self, base: Array) -> Array:
         """(P, L-1, 3) rates from cell to cell of attitudes (P, L, 3, 3), rad/s."""
@@ -59,8 +63,13 @@ class TiltBench:
 
     def freed(self, x: Array) -> Array:
         """Without a constant and a slope in each piece."""
-        flat = x.reshape(len(x), x.shape[1], -1)
-        return np.asarray((flat - self.basis @ (self.basis.T @ flat)).reshape(x.shape))
+        flat, basis = x.reshape(len(x), x.shape[1], -1), _line(x.shape[1])
+        return np.asarray((flat - basis @ (basis.T @ flat)).reshape(x.shape))
+
+    def _averaged(self, x: Array) -> Array:
+        """Means over `AVERAGED` cells, pieces freed of a line."""
+        sums = np.cumsum(x, axis=1)
+        return self.freed((sums[:, AVERAGED:] - sums[:, :-AVERAGED]) / AVERAGED)
 
     def left(self, theta: Array) -> float:
         """RMS of specific force that gyros with these increments do not explain, m/s^2."""
@@ -72,17 +81,21 @@ class TiltBench:
 
         The base's own motion is in these, and what a single piece alone shows has no small one. So is a bias of the accelerometers:
         in axes that do not turn it turns with the IMU, as gravity does in the IMU's, and passes for gyros that turn too far.
+
+        All is averaged over half a second: the angular acceleration that an arm is fitted to has the noise of the gyros in it,
+        differentiated. On a rope of 15 m that of gyros of .05 deg/sqrt(h) made the arm too short, and scale factors 3 % wrong.
         """
-        flat, C = self.carried(theta)
+        columns, C = self._columns(theta)
         up = (C @ self.force[..., None])[..., 0]
         rate = (C @ (theta / self.interval)[..., None])[..., 0]
         rate -= rate.mean(axis=1, keepdims=True)
         turns = C * theta[..., None, :]  # about each axis, in axes that do not turn
         angle = np.cumsum(turns, axis=1) - 0.5 * turns
         # Gyros that are late have not turned yet.
-        late = [self.freed(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
-        scale = [self.freed(np.cross(angle[..., i], up)).ravel() for i in range(3)]
-        biased = self.accel_bias * self.freed(C).reshape(-1, 3)
+        late = [self._averaged(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
+        scale = [self._averaged(np.cross(angle[..., i], up)).ravel() for i in range(3)]
+        biased = self.accel_bias * self._averaged(C).reshape(-1, 3)
+        flat = self._averaged(columns).reshape(-1, 4)
         of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale], biased)
         of_each = _by_pieces(len(theta), flat, [*late, *scale], biased)
         off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
