@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Matched
 from truenorth.alignment.result import Alignment, History
-from truenorth.alignment.transfer_filter import Assumed, MasterRows, axes_along, by_rows
+from truenorth.alignment.transfer_filter import Assumed, axes_along
 from truenorth.alignment.transfer_nominal import final_attitudes
 from truenorth.alignment.transfer_result import Relation, Transfer
+from truenorth.alignment.transfer_rows import MasterRows, by_rows
 from truenorth.alignment.transfer_start import bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import seen_states, system_along
 from truenorth.alignment.transfer_verdict import judge_transfer

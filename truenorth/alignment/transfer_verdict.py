@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, axes_along, by_rows
+from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, axes_along
 from truenorth.alignment.transfer_result import Transfer
+from truenorth.alignment.transfer_rows import by_rows
 from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.errors.master import ATTITUDE_ERROR, FILTER, VELOCITY_ERROR
