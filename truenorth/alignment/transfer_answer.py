@@ -87,6 +87,7 @@ class LastPass(NamedTuple):
     # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
     carried: float = 0.0
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
+    left: float = 0.0  # sigmas that the last pass that sought the motion has still moved it by
 
 
 def assemble_transfer(
@@ -129,7 +130,7 @@ def assemble_transfer(
         source=slave.source,
         transfer=transfer,
     )
-    return judge_transfer(answer, transfer, track, assumed, heading_limit, of_master, last.least)
+    return judge_transfer(answer, transfer, track, assumed, heading_limit, of_master, last.least, last.left)
 
 
 def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Transfer:

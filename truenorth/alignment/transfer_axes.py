@@ -1,9 +1,11 @@
 """Scale factors and misalignments of a slave's sensors, as states where what they do stands out of the master's rows.
 
 A gyro's scale factor `k` moves a velocity that is carried over an arm `r` by ``k w r``, and an accelerometer's that by `k` times
-what the force beyond its mean makes of it: alike in each sway, so that n rows of noise `s` tell it from ``s / sqrt(n)`` on. A consumer IMU 30 m from the master
-of a ship that rolls has 2 cm/s of the one and 1 cm/s of the other: its arm was up to 18 sigmas off without these states, and level
-and heading 11. Gyros also turn attitude wrongly, wherever they sit: those that show it against their own noise have their states.
+what the force beyond its mean makes of it: alike in each manoeuvre, so that n rows of noise `s` tell it from ``s / sqrt(n)`` on.
+A consumer IMU 30 m from the master of a ship that rolls has 2 cm/s of the one and 1 cm/s of the other: its arm was up to 18
+sigmas off without these states, and level and heading 11. A tactical IMU that turns for ten seconds has 1 cm/s of accelerometers'
+axes: its level was 1.85 of its sigma off. Gyros also turn attitude wrongly, wherever they sit: those that show it against their own
+noise have their states.
 """
 
 from __future__ import annotations

@@ -317,8 +317,8 @@ def _translation(master: MasterRecord, kind: Translation, place: Array | None, l
     measured[:, 3:6] = _acceleration(master, place)
     if linear is None:
         return measured
-    measured[:, 43] = linear.late
     if linear.late != 0.0:
+        measured[:, 43] = linear.late
         then = master.time - linear.late
         measured[:, 3:6] = np.stack([np.interp(then, master.time, axis) for axis in measured[:, 3:6].T], axis=1)
     if linear.flatter is not None:

@@ -342,6 +342,7 @@ SENTENCES = {
         "specification ({imu:imu}) allows, or the master drifts"
     ),
     "transfer.filter": "a filter of some {constant:.2f} s smoothed the master's velocity: its arm may be off by more than sigma",
+    "transfer.unsettled": "the passes over the log do not settle: the last one still moved the answer by {left:.1f} of its sigmas",
     "transfer.lasting": (
         "{name}: what it differs from the slave by ({size:.3g} {unit}) lasts from row to row ({colour:.0f} times the error of "
         "white noise): this is no motion of one rigid body"
