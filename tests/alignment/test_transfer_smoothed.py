@@ -74,7 +74,7 @@ def columns_of(monkeypatch, found, push, **of_motion):
     sensors[-1, own] = found
     track = Track(held, held, held, held, sensors, P, model.layout, ())
     slave = SimpleNamespace(interval=0.01)
-    return held, flatter_along(slave, track, None, model, held - found[0], np.zeros(3), 0.05)
+    return held, flatter_along(slave, track, None, model, held - found[0], (np.zeros(3), 0.0), 0.05)
 
 
 @pytest.mark.parametrize("constant", [0.05, 0.1])

@@ -209,7 +209,8 @@ def _linear(
         if of_filter != 0.0:
             C_late = np.full_like(C_nb, np.nan)
             C_late[rows] = carried.at(slave, held[rows])
-        flatter = flatter_along(slave, track, carried, model, held, assumed.lever_arm, sigma)
+        seat = (assumed.lever_arm, assumed.lever_arm_sigma)
+        flatter = flatter_along(slave, track, carried, model, held, seat, sigma)
     if sigma is not None and opened:
         said = (assumed.lever_arm, assumed.lever_arm_sigma, assumed.delay_sigma)
         calibrated = before is not None and before.columns is not None

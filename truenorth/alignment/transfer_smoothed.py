@@ -54,7 +54,7 @@ LONGEST = 0.2  # s: of the time constant by which the means are chosen
 
 
 def flatter_along(
-    slave: ImuRecord, track: Track, carried: Carried, model: TransferModel, held: Array, lever_arm: Array, sigma: float
+    slave: ImuRecord, track: Track, carried: Carried, model: TransferModel, held: Array, said: tuple[Array, float], sigma: float
 ) -> Array | None:
     """(M, 6) ``v..``, m/s^3, and ``v...``, m/s^4, of the master, n; NaN near the ends of a log; None where it has no filter.
 
@@ -64,17 +64,18 @@ def flatter_along(
         The attitude along the motion that a pass has found.
     held : (M,) array, s
         When a master's velocities held.
-    lever_arm : (3,) array, m
-        As assumed before the log.
+    said : (3,) array, float, m
+        Lever arm and its sigma, before the log.
     sigma : float, m/s
         Noise of a row.
     """
     own = track.layout.slice_of(FILTER)
     if own is None:
         return None
-    P, at = track.P[-1], track.layout.slice_of(ARM)
+    (lever_arm, arm_sigma), at = said, track.layout.slice_of(ARM)
     arm = lever_arm + (0.0 if at is None else track.sensors[-1, at])
-    reach = float(arm @ arm) + (0.0 if at is None else float(np.trace(P[at, at])))
+    # Not of the arm as found: longer means by it would move it, to and fro.
+    reach = float(lever_arm @ lever_arm) + 3.0 * arm_sigma**2
     constant = min(math.sqrt(2.0 * max(float(track.sensors[-1, own][1]), 0.0)), LONGEST)
     means, walk, push = Means(slave, track, carried, held, arm), model.gyro_random_walk, model.accel_random_walk
     lengths = [h for h in HALVES if h > 2.0 * slave.interval]
