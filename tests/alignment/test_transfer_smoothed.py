@@ -21,7 +21,7 @@ AT, STEP = np.array([41.3, 42.3]), 0.02  # s
 
 
 def test_what_a_filter_does_to_a_velocity_is_its_columns():
-    """Late, flatter where the acceleration changes, and skewed: a row of a master on an arm of a ship, taken when it held, is H x."""
+    """Late, flatter and skewed: a row of a master on an arm of a ship, taken when it held, is H x."""
     way, late, flat, skewed = ship(np.random.default_rng(1), 60.0), 0.1, 0.006, 0.0004
     model = TransferModel(filter=filter_sigmas(0.15, True))
     at = way.states(AT - late)

@@ -54,7 +54,13 @@ LONGEST = 0.2  # s: of the time constant by which the means are chosen
 
 
 def flatter_along(
-    slave: ImuRecord, track: Track, carried: Carried, model: TransferModel, held: Array, said: tuple[Array, float], sigma: float
+    slave: ImuRecord,
+    track: Track,
+    carried: Carried,
+    model: TransferModel,
+    held: Array,
+    said: tuple[Array, float],
+    sigma: float,
 ) -> Array | None:
     """(M, 6) ``v..``, m/s^3, and ``v...``, m/s^4, of the master, n; NaN near the ends of a log; None where it has no filter.
 
