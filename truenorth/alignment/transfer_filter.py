@@ -161,7 +161,7 @@ def transfer_filter(
             f"runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s): check that both logs have the same clock"
         )
     late = 0.0 if linear is None or matching.translation != "velocity" else linear.late
-    return stamped_as_the_master(track, master, master.time - assumed.delay, late)
+    return stamped_as_the_master(track, master.time - assumed.delay, late)
 
 
 def master_aiding(

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.master import MASTER_ATTITUDE, MASTER_VELOCITY
 from truenorth.estimate.memory import ABSENT, REJECTED, REOPENED, USED
-from truenorth.records import MasterRecord
 from truenorth.state.track import RESIDUALS, Residuals, Track
 
 Array = NDArray[np.float64]
@@ -35,50 +34,35 @@ class MasterRows(NamedTuple):
 
 def by_rows(track: Track) -> MasterRows:
     """The residuals of a track of :func:`truenorth.alignment.transfer_filter.transfer_filter`, row by row of the master."""
-    stamps = _stamps(track)
-    count, order = len(stamps), np.argsort(stamps)
+    stamps = np.unique(np.concatenate([r.stamp for r in track.residuals]))
+    count = len(stamps)
     assert count == len(track)  # each row is put out once
     innovation, sigma = np.full((2, count, 6), np.nan)
     nis, verdict = np.full((count, 2), np.nan), np.full((count, 2), ABSENT)
     for r in track.residuals:
         kind = ATTITUDE if r.name == MASTER_ATTITUDE.name else TRANSLATION
-        at = order[np.searchsorted(stamps, r.stamp, sorter=order)]
+        at = np.searchsorted(stamps, r.stamp)
         columns = slice(3 * kind, 3 * kind + 3)
         innovation[at, columns], sigma[at, columns], nis[at, kind] = r.innovation, r.sigma, r.nis
         verdict[at, kind] = np.where(r.jumped, REOPENED, np.where(r.used, USED, REJECTED))
     return MasterRows(stamps, innovation, sigma, nis, verdict)
 
 
-def _stamps(track: Track) -> Array:
-    """(K,) s, of the epochs of a track: a row's attitude puts it out, its translation where it has none."""
-    attitude = [r for r in track.residuals if r.name == MASTER_ATTITUDE.name]
-    known = np.concatenate([np.zeros(0), *(r.stamp for r in attitude)])
-    putting = [(r.time, r.stamp) for r in attitude]
-    for r in track.residuals:
-        if r.name != MASTER_ATTITUDE.name:
-            alone = ~np.isin(r.stamp, known)
-            putting.append((r.time[alone], r.stamp[alone]))
-    time, stamp = (np.concatenate(parts) for parts in zip(*putting, strict=True))
-    return np.asarray(stamp[np.argsort(time, kind="stable")])
+def stamped_as_the_master(track: Track, stamps: Array, late: float) -> Track:
+    """A track whose velocities have the stamps of their rows (M,), not those so much (`late`, s) before.
 
-
-def stamped_as_the_master(track: Track, master: MasterRecord, stamps: Array, late: float) -> Track:
-    """A track whose velocities have the stamps of their rows, not those so much (`late`, s) before.
-
-    Velocities near the ends of a log whose attitude falls beyond it have no epoch of their own, and are left out.
+    Attitudes put rows out. Velocities near the ends of a log whose attitude falls beyond it are in no epoch, and are left out.
     """
-    if late == 0.0:
-        return track
     attitude = [r.stamp for r in track.residuals if r.name == MASTER_ATTITUDE.name]
+    if late == 0.0 or not attitude:
+        return track
 
     def of_rows(r: Residuals) -> Residuals:
         if r.name != MASTER_VELOCITY.name:
             return r
-        row = np.searchsorted(stamps - late, r.stamp)
-        kept = np.ones(len(row), dtype=bool)
-        if attitude and master.C_nb is not None:
-            kept = np.isin(stamps[row], attitude[0]) | np.isnan(master.C_nb[row]).any(axis=(1, 2))
-        r = replace(r, stamp=stamps[row])
+        own = stamps[np.searchsorted(stamps - late, r.stamp)]
+        kept = np.isin(own, attitude[0])
+        r = replace(r, stamp=own)
         return replace(r, **{name: getattr(r, name)[kept] for name in RESIDUALS})
 
     return replace(track, residuals=tuple(of_rows(r) for r in track.residuals))
