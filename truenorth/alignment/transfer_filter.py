@@ -83,8 +83,6 @@ class Linear:
     C_nm: Array
     C_nb: Array
     delay: float = 0.0  # s; beyond the known one
-    late: float = 0.0  # s: by which a filter makes velocities later than that
-    C_late: Array | None = None  # the slave's when these held; `C_nb` where None
     # s: what the filter begins with of it, and the sigma of that; as the start says when left out
     begin: tuple[float, float] | None = None
     phase: float = math.inf  # s: sigma of the delay, by which the phase of a vibration at the rows is known
@@ -92,6 +90,8 @@ class Linear:
     scatter: Mapping[str, float] = field(default_factory=dict)  # s: one sigma of stamps, by the name of their rows
     scattered: Mapping[str, Array] = field(default_factory=dict)  # (M, 3) what that adds to sigmas
     flatter: Array | None = None  # (M, 6) what a filter of the master's velocity makes flatter
+    late: float = 0.0  # s: by which a filter makes velocities later than `delay`
+    C_late: Array | None = None  # the slave's when these held; `C_nb` where None
 
 
 def transfer_filter(

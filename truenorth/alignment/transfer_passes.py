@@ -215,7 +215,7 @@ def _linear(
         said = (assumed.lever_arm, assumed.lever_arm_sigma, assumed.delay_sigma)
         calibrated = before is not None and before.columns is not None
         columns = columns_along(slave, track, carried, model, held, said, sigma, calibrated)
-    return Linear(C_nm, C_nb, late, of_filter, C_late, begin, phase, columns, flatter=flatter)
+    return Linear(C_nm, C_nb, late, begin, phase, columns, flatter=flatter, late=of_filter, C_late=C_late)
 
 
 def _with_scatter(found: Linear, before: Linear | None, track: Track, sources: list[Aiding]) -> Linear:
