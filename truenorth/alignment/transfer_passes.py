@@ -26,7 +26,7 @@ from truenorth.alignment.transfer_filter import (
 )
 from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_for, found_by
 from truenorth.alignment.transfer_rows import by_rows
-from truenorth.alignment.transfer_smoothed import flatter_along
+from truenorth.alignment.transfer_smoothed import LONGEST, flatter_along
 from truenorth.errors.master import ARM, DELAY, FILTER, MOUNTING, TransferModel
 from truenorth.estimate.batch import settle
 from truenorth.estimate.memory import REOPENED, USED
@@ -203,7 +203,8 @@ def _linear(
     )
     columns = flatter = C_late = None
     own = track.layout.slice_of(FILTER)
-    of_filter = 0.0 if own is None else float(track.sensors[-1, own][0])
+    # No filter is early, or later than is borne: what is found beyond is the fault of something else, and a row there tells less.
+    of_filter = 0.0 if own is None else float(np.clip(track.sensors[-1, own][0], 0.0, LONGEST))
     held = master.time - assumed.delay - late - of_filter
     if sigma is not None:
         if of_filter != 0.0:
