@@ -108,9 +108,9 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     """Measured: velocity; the master's acceleration, or the slave's spin; its attitude to linearise with; its rate; or NaN.
 
     Then the columns of delay and arm (n, 3 x 4, by rows), and by what ``C [w x]`` is to be multiplied (3 x 4) to be what of the
-    instant's noise is in them, or NaN (:mod:`truenorth.alignment.transfer_columns`). Last what
-    a filter makes late and flatter: what velocity changes in the delay that it is known to make, m/s, derivatives of velocity of
-    then, m/s^3 and m/s^4, n, and that delay, s; or NaN.
+    instant's noise is in them, or NaN (:mod:`truenorth.alignment.transfer_columns`). Last the
+    derivatives of velocity of which a filter makes it flatter, m/s^3 and m/s^4, n, and how much before its stamp the row is taken
+    already since a filter made it late, s; or NaN.
 
     Acceleration and attitude (quaternion) are of n. Without either, the spin is that of the instant. The rate is what its gyros
     say, in body axes, without what vibrates (:mod:`truenorth.alignment.transfer_shaken`); else that of the instant.
@@ -145,8 +145,8 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         own = acceleration(now, force, False)
         push = (own[0] - arms[0], own[1] - arms[1], own[2] - arms[2])
     away = (-r[0], -r[1], -r[2])
-    led_back = at[AT_FILTER] >= 0 and not np.isnan(measured[37])
-    lag = lag_now(now, assumed, at[AT_LAG]) + state_of(assumed, at[AT_FILTER]) - (measured[46] if led_back else 0.0)
+    lag = lag_now(now, assumed, at[AT_LAG]) + state_of(assumed, at[AT_FILTER])
+    lag -= 0.0 if np.isnan(measured[43]) else measured[43]
     velocity_row(now, C, w_eb, push, away, lag, -1, at[AT_LAG], measured, H, z)
     if at[AT_ARM] >= 0:
         turn = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
@@ -167,10 +167,8 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         a, late = at[AT_FILTER], into_n(now, push)
         for i in range(3):
             H[i, a] = H[i, at[AT_LAG]] if at[AT_LAG] >= 0 else late[i]
-            if led_back:
-                z[i] -= measured[37 + i]
-            if not (np.isnan(measured[40]) or np.isnan(measured[43])):
-                H[i, a + 1], H[i, a + 2] = -measured[40 + i], measured[43 + i]
+            if not (np.isnan(measured[37]) or np.isnan(measured[40])):
+                H[i, a + 1], H[i, a + 2] = -measured[37 + i], measured[40 + i]
                 z[i] -= H[i, a + 1] * assumed[a + 1] + H[i, a + 2] * assumed[a + 2]
     if at[AT_OWN] >= 0:  # as biases of the gyros; by a rate of another noise, as the arm
         seen = beyond_noise(other, figures[OWN])
@@ -261,7 +259,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 
 MASTER_VELOCITY = Row(
-    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9, "filter": 3}, width=47, instant=True
+    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9, "filter": 3}, width=44, instant=True
 )
 MASTER_ATTITUDE = Row(
     "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=10, instant=True, unit="rad"

@@ -174,7 +174,7 @@ def align_transfer(
     track = as_said_together(track, model, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
-    last = LastPass(part, master, model, said, start, what, noise, track, carried, least)
+    last = LastPass(part, master, model, said, start, what, noise, track, carried, least, found.left)
     answer = assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Matched
 from truenorth.alignment.result import Alignment, History
-from truenorth.alignment.transfer_filter import Assumed, MasterRows, axes_along, by_rows
+from truenorth.alignment.transfer_filter import Assumed, axes_along
 from truenorth.alignment.transfer_nominal import final_attitudes
 from truenorth.alignment.transfer_result import Relation, Transfer
+from truenorth.alignment.transfer_rows import MasterRows, by_rows
 from truenorth.alignment.transfer_start import bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import seen_states, system_along
 from truenorth.alignment.transfer_verdict import judge_transfer
@@ -86,6 +87,7 @@ class LastPass(NamedTuple):
     # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
     carried: float = 0.0
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
+    left: float = 0.0  # sigmas that the last pass that sought the motion has still moved it by
 
 
 def assemble_transfer(
@@ -128,7 +130,7 @@ def assemble_transfer(
         source=slave.source,
         transfer=transfer,
     )
-    return judge_transfer(answer, transfer, track, assumed, heading_limit, of_master, last.least)
+    return judge_transfer(answer, transfer, track, assumed, heading_limit, of_master, last.least, last.left)
 
 
 def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Transfer:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from truenorth.aiding.row import Row
 from truenorth.aiding.source import Aiding, Role
 from truenorth.alignment.transfer_columns import OTHER_NOISE, Columns
 from truenorth.alignment.transfer_nominal import Nominal
+from truenorth.alignment.transfer_rows import stamped_as_the_master
 from truenorth.alignment.transfer_turns import KNOWN, MEAN, push_of, shaken, spins_at, turns_at
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
@@ -34,7 +34,6 @@ from truenorth.errors.master import (
     VELOCITY_ERROR,
     TransferModel,
 )
-from truenorth.estimate.memory import ABSENT, REJECTED, REOPENED, USED
 from truenorth.estimate.run import navigate_track
 from truenorth.quality.stamps import with_scatter
 from truenorth.records import ImuRecord, MasterRecord
@@ -44,12 +43,10 @@ from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body turn little in it
 SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
 SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
-TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
 
 
 @dataclass(frozen=True)
@@ -92,17 +89,9 @@ class Linear:
     columns: Columns | None = None  # of delay and arm in an open loop; those of the instant where None
     scatter: Mapping[str, float] = field(default_factory=dict)  # s: one sigma of stamps, by the name of their rows
     scattered: Mapping[str, Array] = field(default_factory=dict)  # (M, 3) what that adds to sigmas
-    flatter: Array | None = None  # (M, 10) what a filter of the master's velocity makes late and flatter
-
-
-class MasterRows(NamedTuple):
-    """What each row of the master said against the prediction; the rows are the epochs of the track."""
-
-    stamp: Array  # (K,) s: its time less the delay that is assumed
-    innovation: Array  # (K, 6): velocity (m/s; or position, acceleration) and attitude (rad); NaN where absent
-    sigma: Array  # (K, 6)
-    nis: Array  # (K, 2)
-    verdict: Integers  # (K, 2): `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`
+    flatter: Array | None = None  # (M, 6) what a filter of the master's velocity makes flatter
+    late: float = 0.0  # s: by which a filter makes velocities later than `delay`
+    C_late: Array | None = None  # the slave's when these held; `C_nb` where None
 
 
 def transfer_filter(
@@ -171,7 +160,8 @@ def transfer_filter(
             f"{master.source}: no row falls into the slave's record ({slave.time[0]:.3f} s to {slave.time[-1]:.3f} s; the master "
             f"runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s): check that both logs have the same clock"
         )
-    return track
+    late = 0.0 if linear is None or matching.translation != "velocity" else linear.late
+    return stamped_as_the_master(track, master.time - assumed.delay, late)
 
 
 def master_aiding(
@@ -185,6 +175,7 @@ def master_aiding(
     """The master's rows as the loop takes them: its place, its translation, its attitude; what is not matched is left out."""
     count, groups, kind = len(master), model.groups, matching.translation
     stamps, found, place = master.time - assumed.delay, [], None
+    late = linear.late if linear is not None and kind == "velocity" else 0.0
     patience = max(2, round(matching.patience / master.interval))
     held = stamps - (0.0 if linear is None else linear.delay)  # when they held, as far as is known
     of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
@@ -202,7 +193,7 @@ def master_aiding(
         if kind == "acceleration":
             measured[:, 3:] = _slopes(slave, held)
         elif kind == "velocity":
-            own = (own[0], _add_turns(measured, slave, master, model, assumed, held, linear))
+            own = (own[0], _add_turns(measured, slave, master, model, assumed, held - late, linear))
         elif (reach := _reach(assumed)) > 0.0:
             turns, of_turn = turns_at(slave, held, model.gyro_random_walk, matching.sigma / reach)
             measured[:, 3:], own = np.nan if turns is None else turns, (of_turn,)
@@ -220,7 +211,7 @@ def master_aiding(
             Aiding(
                 row.name,
                 row,
-                stamps,
+                stamps - late,
                 measured,
                 np.full((count, 3), matching.sigma),
                 assumed.lever_arm,
@@ -324,10 +315,16 @@ def _translation(master: MasterRecord, kind: Translation, place: Array | None, l
     measured = np.full((len(master), MASTER_VELOCITY.width), np.nan)
     measured[:, :3] = master.v_n
     measured[:, 3:6] = _acceleration(master, place)
-    if linear is not None and linear.flatter is not None:
-        measured[:, 37:] = linear.flatter
-    if linear is not None and np.isnan(measured[:, 3]).any():
-        measured[:, 6:10] = _quaternions(linear.C_nb)
+    if linear is None:
+        return measured
+    if linear.late != 0.0:
+        measured[:, 43] = linear.late
+        then = master.time - linear.late
+        measured[:, 3:6] = np.stack([np.interp(then, master.time, axis) for axis in measured[:, 3:6].T], axis=1)
+    if linear.flatter is not None:
+        measured[:, 37:43] = linear.flatter
+    if np.isnan(measured[:, 3]).any():
+        measured[:, 6:10] = _quaternions(linear.C_nb if linear.C_late is None else linear.C_late)
     return measured
 
 
@@ -374,22 +371,6 @@ def _acceleration(master: MasterRecord, place: Array | None) -> Array:
     lat, alt, v = place[:, 0], place[:, 2], master.v_n
     coriolis = np.cross(2 * earth_rate_n(lat) + transport_rate_n(lat, alt, v), v)
     return np.asarray(np.einsum("kij,kj->ki", master.C_nb, master.f_b) - coriolis + gravity_n(lat, alt))
-
-
-def by_rows(track: Track) -> MasterRows:
-    """The residuals of a track of :func:`transfer_filter`, row by row of the master."""
-    stamps = np.unique(np.concatenate([r.stamp for r in track.residuals]))
-    count = len(stamps)
-    assert count == len(track)  # each row is put out once
-    innovation, sigma = np.full((2, count, 6), np.nan)
-    nis, verdict = np.full((count, 2), np.nan), np.full((count, 2), ABSENT)
-    for r in track.residuals:
-        kind = ATTITUDE if r.name == MASTER_ATTITUDE.name else TRANSLATION
-        at = np.searchsorted(stamps, r.stamp)
-        columns = slice(3 * kind, 3 * kind + 3)
-        innovation[at, columns], sigma[at, columns], nis[at, kind] = r.innovation, r.sigma, r.nis
-        verdict[at, kind] = np.where(r.jumped, REOPENED, np.where(r.used, USED, REJECTED))
-    return MasterRows(stamps, innovation, sigma, nis, verdict)
 
 
 def axes_along(track: Track, assumed: Assumed) -> Array:

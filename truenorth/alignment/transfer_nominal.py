@@ -96,6 +96,12 @@ class Carried(NamedTuple):
     C_n0: Array  # (K, 3, 3) axes of the body at the beginning, as the gyros carry them, to those of n at each row
     q: Array  # (N + 1, 4) attitude in the axes of the beginning, there and at the end of each sample
 
+    def at(self, slave: ImuRecord, time: Array) -> Array:
+        """(K, 3, 3) attitude at the samples nearest to other times, s, little off those of the rows."""
+        begin = slave.time[0] - slave.steps[0]
+        nearest = np.clip(np.searchsorted(slave.time, time - 0.5 * slave.interval) + (time > begin), 0, len(slave))
+        return np.asarray(self.C_n0 @ dcm_from_quaternion(self.q[nearest]))
+
 
 def final_attitudes(slave: ImuRecord, track: Track) -> Array:
     """(K, 3, 3) the final attitude carried back to each row by the gyros."""

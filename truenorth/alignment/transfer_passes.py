@@ -21,13 +21,13 @@ from truenorth.alignment.transfer_filter import (
     Linear,
     Matching,
     axes_along,
-    by_rows,
     master_aiding,
     transfer_filter,
 )
 from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_for, found_by
-from truenorth.alignment.transfer_smoothed import flatter_along
-from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
+from truenorth.alignment.transfer_rows import by_rows
+from truenorth.alignment.transfer_smoothed import LONGEST, flatter_along
+from truenorth.errors.master import ARM, DELAY, FILTER, MOUNTING, TransferModel
 from truenorth.estimate.batch import settle
 from truenorth.estimate.memory import REOPENED, USED
 from truenorth.quality.stamps import scattered, stamp_scatter
@@ -125,6 +125,8 @@ def found_in_passes(
             rows = Matching(FIRST_NOISE["velocity"], noise[1])
         track = transfer_filter(part, master, model, start, rows, assumed, linear=linear, nominal=nominal)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
+        if passes + 1 == CLOSED and kind == "velocity":
+            track = _arm_as_said(track)
         begin = linear.begin if linear is not None else delay_found(track) if velocity else None
         passes += 1
         means = noise[0] if kind == "velocity" and np.isfinite(noise[0]) else None
@@ -145,6 +147,20 @@ def found_in_passes(
     last = settle(log, open_loop, lambda found: found.moved, enough=SETTLED, most=MOST)
     assert linear is not None
     return Found(noise, linear, log.nominal.corrected(last.found.end, mounting), last.moved)
+
+
+def _arm_as_said(track: Track) -> Track:
+    """Without what a closed loop says of the arm, to begin open loops with.
+
+    The noise in its columns parts a delay from an arm forward, which in turns at a steady speed are one: a consumer slave's arm was
+    15 m, of one that was known to 1 m. What is worked out for such an arm has fifteen times the noise of the gyros' spin.
+    """
+    at = track.layout.slice_of(ARM)
+    if at is None:
+        return track
+    sensors = track.sensors.copy()
+    sensors[:, at] = 0.0
+    return replace(track, sensors=sensors)
 
 
 def delay_found(track: Track) -> tuple[float, float] | None:
@@ -176,7 +192,8 @@ def _linear(
     Where rows of velocity with this noise, m/s, come next, with what their filter makes flatter; in an open loop, their columns.
     """
     C_nb, carried = np.full((len(master), 3, 3), np.nan), carried_back(slave, track, carried_for(slave, model))
-    C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = carried.C_nb
+    rows = np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)
+    C_nb[rows] = carried.C_nb
     C_nm = C_nb @ axes_along(track, assumed)[-1].T
     if master.C_nb is not None:
         C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
@@ -184,15 +201,22 @@ def _linear(
     late, phase = (
         (0.0, math.inf) if tau is None else (float(track.sensors[-1, tau][0]), SURELY * float(track.sigma[-1, tau][0]))
     )
-    columns = flatter = None
-    held = master.time - assumed.delay - late
+    columns = flatter = C_late = None
+    own = track.layout.slice_of(FILTER)
+    # No filter is early, or later than is borne: what is found beyond is the fault of something else, and a row there tells less.
+    of_filter = 0.0 if own is None else float(np.clip(track.sensors[-1, own][0], 0.0, LONGEST))
+    held = master.time - assumed.delay - late - of_filter
     if sigma is not None:
-        flatter = flatter_along(slave, track, carried, model, held, assumed.lever_arm, sigma)
+        if of_filter != 0.0:
+            C_late = np.full_like(C_nb, np.nan)
+            C_late[rows] = carried.at(slave, held[rows])
+        seat = (assumed.lever_arm, assumed.lever_arm_sigma)
+        flatter = flatter_along(slave, track, carried, model, held, seat, sigma)
     if sigma is not None and opened:
         said = (assumed.lever_arm, assumed.lever_arm_sigma, assumed.delay_sigma)
         calibrated = before is not None and before.columns is not None
         columns = columns_along(slave, track, carried, model, held, said, sigma, calibrated)
-    return Linear(C_nm, C_nb, late, begin, phase, columns, flatter=flatter)
+    return Linear(C_nm, C_nb, late, begin, phase, columns, flatter=flatter, late=of_filter, C_late=C_late)
 
 
 def _with_scatter(found: Linear, before: Linear | None, track: Track, sources: list[Aiding]) -> Linear:

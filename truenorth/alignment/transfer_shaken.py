@@ -61,14 +61,15 @@ def shaken_evidence(
     """
     if what.translation != "velocity" or linear is None or master.v_n is None:
         return []
-    held = master.time - assumed.delay - linear.delay
+    held = master.time - assumed.delay - linear.delay - linear.late
     rates = shaken(slave, held, model.gyro_random_walk, min(assumed.delay_sigma, linear.phase))
     if rates is None:
         return []
     arm, off = _arm_of(track, assumed), []
+    C_nb = linear.C_nb if linear.C_late is None else linear.C_late
     for part in (rates.fast, rates.quarter):
         for swing in np.diag(arm):
-            added = np.nan_to_num(np.einsum("kij,kj->ki", linear.C_nb, np.cross(part, swing)))
+            added = np.nan_to_num(np.einsum("kij,kj->ki", C_nb, np.cross(part, swing)))
             other = run(slave, model=model, start=start, master=replace(master, v_n=master.v_n + added))
             phi = rotation_vector_from_dcm(other.C_nb[-1] @ track.C_nb[-1].T)
             off.append(np.concatenate([phi, other.v_n[-1] - track.v_n[-1]]))

@@ -7,8 +7,9 @@ first terms of a motion are, with dots for derivatives,
 
 of one of the first order ``lambda = T``, ``chi = T^2 / 2``, ``kappa = T^3 / 3``. `lambda` is a delay, the others are none. An
 aircraft that rolls into a coordinated turn at a rate `p` has ``v.. = g p`` across: an arm ``g chi`` up, 5 cm of a filter of .1 s.
-What begins and ends such a roll is ``v...``, which drew delay and arm forward along each other. So all are taken where they hold,
-at ``t - lambda`` as found by the pass before: a line from `t` is 1 cm/s off after .1 s of such a roll.
+What begins and ends such a roll is ``v...``, which drew delay and arm forward along each other. So a row of velocity is taken
+where it holds, at ``t - lambda`` as found by the pass before, and its attitude at `t`: a line from `t` is 1 cm/s off after .1 s of
+such a roll, and what tilt and biases do until `t` is 4 mm/s of a slave that is .3 deg off.
 
 Derivatives are those of the master's specific force `f`, n: means over `b` about ``t + h`` less those about ``t - h``, with
 ``b = h / 2``, and the second difference of such means. Such a mean holds derivatives of two orders more,
@@ -48,36 +49,40 @@ Array = NDArray[np.float64]
 FALSE = 0.5  # of what is known before: so much more a column of noise may be thought to show
 SHARE = 0.02  # of what a column knows, that may be noise where that is more
 FLAT, SKEWED = 2.0, 3.25  # time constants of a filter of the first order whose next terms these means have
+STEPS = 16  # lengths that are tried: of twice the right one a roll in 2 s is a third smaller
 LONGEST = 0.2  # s: of the time constant by which the means are chosen
-QUIET = 0.3  # of the noise of a row: what is led back to an earlier moment may have
 
 
 def flatter_along(
-    slave: ImuRecord, track: Track, carried: Carried, model: TransferModel, held: Array, lever_arm: Array, sigma: float
+    slave: ImuRecord,
+    track: Track,
+    carried: Carried,
+    model: TransferModel,
+    held: Array,
+    said: tuple[Array, float],
+    sigma: float,
 ) -> Array | None:
-    """(M, 10) what velocity changes in `lambda`, m/s; ``v..``, m/s^3, and ``v...``, m/s^4, of then, n; `lambda`, s.
-
-    NaN near the ends of a log; None where its velocity is taken as it is.
+    """(M, 6) ``v..``, m/s^3, and ``v...``, m/s^4, of the master, n; NaN near the ends of a log; None where it has no filter.
 
     Parameters
     ----------
     carried : Carried
         The attitude along the motion that a pass has found.
     held : (M,) array, s
-        When a master's rows held.
-    lever_arm : (3,) array, m
-        As assumed before the log.
+        When a master's velocities held.
+    said : (3,) array, float, m
+        Lever arm and its sigma, before the log.
     sigma : float, m/s
         Noise of a row.
     """
     own = track.layout.slice_of(FILTER)
     if own is None:
         return None
-    P, at = track.P[-1], track.layout.slice_of(ARM)
+    (lever_arm, arm_sigma), at = said, track.layout.slice_of(ARM)
     arm = lever_arm + (0.0 if at is None else track.sensors[-1, at])
-    reach = float(arm @ arm) + (0.0 if at is None else float(np.trace(P[at, at])))
-    late, flat, _ = (float(x) for x in track.sensors[-1, own])
-    constant = min(math.sqrt(2.0 * max(flat, 0.0)), LONGEST)
+    # Not of the arm as found: longer means by it would move it, to and fro.
+    reach = float(lever_arm @ lever_arm) + 3.0 * arm_sigma**2
+    constant = min(math.sqrt(2.0 * max(float(track.sensors[-1, own][1]), 0.0)), LONGEST)
     means, walk, push = Means(slave, track, carried, held, arm), model.gyro_random_walk, model.accel_random_walk
     lengths = [h for h in HALVES if h > 2.0 * slave.interval]
 
@@ -86,7 +91,7 @@ def flatter_along(
         of_push, of_walk, order = noise
         shortest = max(ideal, 2.0 * lengths[0])
         column = np.zeros((len(held), 3))
-        for h in (shortest, *(h for h in lengths if h > shortest)):
+        for h in np.geomspace(shortest, max(shortest, lengths[-1]), STEPS):
             column = derivative(h)
             there = np.isfinite(column).all(axis=1)
             each = of_push * push**2 / h**order + of_walk * reach * walk**2 / h ** (order + 2)
@@ -97,11 +102,11 @@ def flatter_along(
         return column
 
     def first(h: float) -> Array:
-        after, before = (means.held_at(shift - late, 0.5 * h) for shift in (h, -h))
+        after, before = (means.held_at(shift, 0.5 * h) for shift in (h, -h))
         return np.asarray((after - before) / (2.0 * h))
 
     def second(h: float) -> Array:
-        after, now, before = (means.held_at(shift - late, 0.5 * h) for shift in (h, 0.0, -h))
+        after, now, before = (means.held_at(shift, 0.5 * h) for shift in (h, 0.0, -h))
         return np.asarray((after - 2.0 * now + before) / h**2)
 
     _, flat_sigma, skew_sigma = model.filter
@@ -109,11 +114,7 @@ def flatter_along(
         shown(FLAT * constant, flat_sigma, first, (2, 16, 3)),
         shown(SKEWED * constant, skew_sigma, second, (24, 192, 5)),
     )
-    half = next((b for b in lengths if late**2 * reach * 2.0 * walk**2 / b**3 < (QUIET * sigma) ** 2), lengths[-1])
-    # Simpson's rule over the acceleration on the way.
-    now, middle, then = (means.held_at(-part * late, half) for part in (0.0, 0.5, 1.0))
-    led_back = late * ((now + 4.0 * middle + then) / 6.0 + means.corrections)
-    return np.column_stack([led_back, *changes, np.full(len(held), late)])
+    return np.column_stack(changes)
 
 
 def filter_sigmas(constant: float, attitude: bool) -> tuple[float, float, float]:

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, axes_along, by_rows
+from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, axes_along
 from truenorth.alignment.transfer_result import Transfer
+from truenorth.alignment.transfer_rows import by_rows
 from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.errors.master import ATTITUDE_ERROR, FILTER, VELOCITY_ERROR
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 
 MOST_JUMPS = 3  # of the master, that the reasons name one by one
 LONGEST_FILTER = 0.12  # s: of a longer time constant the terms that are left out move the arm by more than its sigma
+UNSETTLED = 1.0  # sigmas: a pass that moves what was found by more has no answer yet
 LOPSIDED, STEADY, FEWEST = 6.0, 0.9, 20  # sigmas of a mean of innovations, their correlation from row to row, rows
 
 
@@ -33,11 +35,12 @@ def judge_transfer(
     heading_limit: float,
     of_master: list[Evidence],
     least: float,
+    left: float = 0.0,
 ) -> Alignment:
     """The answer with its verdict; `of_master` is what was found of the master before, its clock included.
 
     `assumed` is what was said at first; `least` is the noise of its translation that is
-    no surprise: as given, or what the fit begins with.
+    no surprise: as given, or what the fit begins with. `left` is what the last pass has still moved the motion by, in sigmas.
     """
     evidence = list(of_master)
     evidence += _rejected(transfer)
@@ -47,11 +50,14 @@ def judge_transfer(
     if lopsided:
         remedies = ("slave_specification", "without_jump") if transfer.jumps else ("slave_specification",)
         evidence.append(contradiction("transfer.lopsided", *remedies, rows=lopsided, imu=answer.imu_source))
+    evidence += _unsettled(left)
     evidence += _filtered(track)  # last: an IMU that is poorer than it is said to be may look like one
     evidence += notes(transfer.notes) + notes(transfer.jumps[:MOST_JUMPS])
     if len(transfer.jumps) > MOST_JUMPS:  # a master that is reset now and then does not do that
         evidence.append(
-            contradiction("transfer.jumps", "transfer_geometry", "put_times_right", count=len(transfer.jumps))
+            contradiction(
+                "transfer.jumps", "transfer_geometry", "put_times_right", "without_jump", count=len(transfer.jumps)
+            )
         )
     evidence += [note("transfer.open", states=words) for words in transfer.open]
     evidence.append(_against_what(transfer))
@@ -87,6 +93,11 @@ def _misses(transfer: Transfer, track: Track, assumed: Assumed) -> list[Evidence
             remedies = ("slave_axes", f"transfer.{name}")
             found.append(contradiction(f"transfer.{name}", *remedies, miss=miss, prior=float(prior)))
     return found
+
+
+def _unsettled(left: float) -> list[Evidence]:
+    """Passes that still moved attitude, arm, delay or seat by so many sigmas: nobody knows how far they would go."""
+    return [contradiction("transfer.unsettled", "slave_specification", left=left)] if left > UNSETTLED else []
 
 
 def _filtered(track: Track) -> list[Evidence]:

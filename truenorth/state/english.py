@@ -63,16 +63,12 @@ SENTENCES = {
     "heading.wanted": "heading is known to {sigma:angle} only after {duration:.0f} s, {limit:angle} is wanted",
     "level.known": "level is known to {level:deg|.2f} deg (one sigma)",
     "level.known_finely": "level is known to {level:arcmin|.2f} arcmin (one sigma)",
-    "level.unknown": (
-        "level is known to {level:deg|.2f} deg only; {limit:deg|.0f} deg is the most that passes for level"
-    ),
+    "level.unknown": "level is known to {level:deg|.2f} deg only; {limit:deg|.0f} deg is the most that passes for level",
     "level.biased": (
         "level is known to {level:deg|.2f} deg only, however long the log is: an accelerometer's bias can be {bias:mg|.2g} mg "
         "({imu:imu}); {limit:deg|.0f} deg is the most that passes for level"
     ),
-    "latitude.found": (
-        "the latitude was not given: found from the log, {lat:deg|.2f} deg, to {sigma:deg|.2g} deg (one sigma)"
-    ),
+    "latitude.found": "the latitude was not given: found from the log, {lat:deg|.2f} deg, to {sigma:deg|.2g} deg (one sigma)",
     "latitude.assumed": (
         "the latitude was not given: {lat:deg|.0f} deg assumed; gyros as poor, or a log as short, do not see the difference"
     ),
@@ -101,9 +97,7 @@ SENTENCES = {
         "in {north_period:.0f} s along north"
     ),
     "place.hemisphere_in_doubt": "gravity rather turns as in the other hemisphere (likelihood ratio {ratio:.0f}), a doubt",
-    "place.hemisphere": (
-        "gravity turns as in the other hemisphere (likelihood ratio {ratio:.0f}): the latitude has the wrong sign"
-    ),
+    "place.hemisphere": "gravity turns as in the other hemisphere (likelihood ratio {ratio:.0f}): the latitude has the wrong sign",
     "rate.misses": (
         "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification "
         "({imu:imu}) allows {allowed:deg/h|} deg/h"
@@ -272,9 +266,7 @@ SENTENCES = {
         "the zero of the inner axis' angle is off by {off:deg|+.2f} ± {sigma:deg|.2f} deg: the base would wobble as the outer axis "
         "turns"
     ),
-    "gnss.turned": (
-        "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
-    ),
+    "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
     "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
     "master.turned": (
         "the master's velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
@@ -293,16 +285,12 @@ SENTENCES = {
         "the start"
     ),
     "innovations.outliers": "{name}: {rejected} of {count} measurements rejected as outliers",
-    "innovations.size": (
-        "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted"
-    ),
+    "innovations.size": "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted",
     "innovations.coloured": (
         "{name}: innovations are {size:.2f} times as large as their sigma says and follow each other ({colour:.1f} times the error "
         "of white ones): sigma grows {growth:.1f} times"
     ),
-    "innovations.left": (
-        "{name}: what the answer leaves of it is {size:.2f} times as large as sigma says: sigma grows as much"
-    ),
+    "innovations.left": "{name}: what the answer leaves of it is {size:.2f} times as large as sigma says: sigma grows as much",
     "innovations.outside": "{name}: {outside} measurements lie before the start or after the end of the IMU's log",
     "innovations.wander": (
         "{name}: its errors follow each other from row to row (correlation {correlation:.2f}) and wander by {wander:.2g} {unit} or "
@@ -328,12 +316,8 @@ SENTENCES = {
         "{since:.1f} s on, by their motion: one of the clocks steps or runs at another rate"
     ),
     "transfer.rejected": "{share:.0%} of the master's rows contradict the slave",
-    "transfer.delay": (
-        "the delay comes out {miss:ms|.3g} ms from the assumed one, which was said to be known to {prior:ms|.3g} ms"
-    ),
-    "transfer.lever_arm": (
-        "the lever arm comes out {miss:.3g} m from the assumed one, which was said to be known to {prior:.3g} m"
-    ),
+    "transfer.delay": "the delay comes out {miss:ms|.3g} ms from the assumed one, which was said to be known to {prior:ms|.3g} ms",
+    "transfer.lever_arm": "the lever arm comes out {miss:.3g} m from the assumed one, which was said to be known to {prior:.3g} m",
     "transfer.mounting": (
         "the mounting comes out {miss:deg|.3g} deg from the assumed one, which was said to be known to {prior:deg|.3g} deg"
     ),
@@ -342,6 +326,7 @@ SENTENCES = {
         "specification ({imu:imu}) allows, or the master drifts"
     ),
     "transfer.filter": "a filter of some {constant:.2f} s smoothed the master's velocity: its arm may be off by more than sigma",
+    "transfer.unsettled": "the passes over the log do not settle: the last one still moved the answer by {left:.1f} of its sigmas",
     "transfer.lasting": (
         "{name}: what it differs from the slave by ({size:.3g} {unit}) lasts from row to row ({colour:.0f} times the error of "
         "white noise): this is no motion of one rigid body"
@@ -370,9 +355,7 @@ SENTENCES = {
         "{z:deg|+.2f} ± {z_sigma:deg|.2f} deg"
     ),
     "second_look.misfit": "the {name} fits no small scale error and mounting angle",
-    "second_look.long_arm": (
-        "the lever arm of the {name} is {length:.0f} m long, and the data do not show whether it is"
-    ),
+    "second_look.long_arm": "the lever arm of the {name} is {length:.0f} m long, and the data do not show whether it is",
     # ---- a velocity log, for damping
     "log.contradicts": (
         "velocity log: differs from the free INS by {east:.2f} m/s east, {north:.2f} m/s north (median), {allowed:.2f} m/s is "
