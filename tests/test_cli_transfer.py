@@ -38,7 +38,9 @@ def test_what_a_person_reads(logs):
     assert result.exit_code == 0, result.output
     found = re.search(r"mounting, deg: heading ([\d.]+) ± ([\d.]+)", result.stdout)
     assert found, result.stdout
-    assert float(found[1]) == pytest.approx(0.293, abs=3.0 * float(found[2]))  # as the makers of the recording calibrated it
+    assert float(found[1]) == pytest.approx(
+        0.293, abs=3.0 * float(found[2])
+    )  # as the makers of the recording calibrated it
     assert float(found[2]) < 0.05
     assert "right 0 (as given)" in result.stdout
     assert "left open by this motion" in result.stdout

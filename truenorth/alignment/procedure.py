@@ -34,6 +34,7 @@ from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
+from truenorth.alignment.swung_bias import swung_biases
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
 from truenorth.alignment.turning import (
     infer_turning,
@@ -304,7 +305,11 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways else None
+    swung = sways or (swings and turned is None)
+    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if swung else None
+    if swung and not sways and fine.form == "velocity":
+        biased = swung_biases(fine, np.sqrt(used.bias_variance[3:]), task.position)
+        others = biased if others is None else np.concatenate([others, biased], axis=2)
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
     heave = fine.heave if isinstance(fine, SwayAlignment) else None
@@ -314,7 +319,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         steps += scale_on_sway_evidence(
             fine, task.record, lambda record: sway_align(about._replace(record=record), turned=turned, axes=spec)
         )
-    way = farthest(fine, task.position) if sways or (swings and turned is None) else math.inf
+    way = farthest(fine, task.position) if swung else math.inf
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave)
 
 

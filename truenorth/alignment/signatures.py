@@ -37,7 +37,7 @@ def what_begins(
         seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
     )
     steps = bias_step_evidence(fine, spec, bias)
-    steps += masked_evidence(fine, spec) if others is None else []
+    steps += masked_evidence(fine, spec)
     elsewhere = None
     if isinstance(fine, SwayAlignment):
         elsewhere = fine.misfit_at
