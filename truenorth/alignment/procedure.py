@@ -60,6 +60,7 @@ from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
+from truenorth.state.limits import limit
 from truenorth.strapdown.inertial import integrate
 
 Array = NDArray[np.float64]
@@ -173,7 +174,10 @@ def align_base(
         evidence += against(own, answer)
     evidence = weighed_by_heave(found.heave, evidence, task.record)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
-    return judged(answer, evidence, heading_limit)
+    answer = judged(answer, evidence, heading_limit)
+    if found.moved is None:
+        return answer
+    return replace(answer, disturbance=np.maximum(answer.disturbance, found.moved))
 
 
 @dataclass(frozen=True)
@@ -188,6 +192,7 @@ class _Found:
     steps: Sequence[Evidence] = ()
     way: float = math.inf  # m, that a base whose arm was fitted is from its mean place at most
     heave: Heave | None = None  # of a swaying base
+    moved: Array | None = None  # (3,) m/s RMS: of an IMU whose motion a fit has explained, and which goes on
     acted: float | None = None  # share of the epochs in which factors of a published filter acted
 
 
@@ -224,12 +229,9 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     used, where = (infer_turning(task), INFERRED) if spec is None else (spec, f"specification {spec.name!r}")
     fine = turning_align(task, used, np.array([task.epoch.row]))
     answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
-    # The fit takes the arm from the axis: it leaves no motion. Where nothing says so, the IMU moves on as it did.
-    moved = own_motion(fine.integrals, fine.C_n0_i, task.position.lat, task.position.alt, RECENT)
     apart = fine.scatter * np.eye(3)
     answer = replace(
         answer,
-        disturbance=np.maximum(answer.disturbance, moved),
         phi_covariance=without_heading(answer.phi_covariance + apart),
         phi_floor=without_heading(answer.phi_floor + apart),
         pays_until=None,
@@ -237,7 +239,9 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     )
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
     way = strays(fine, task.position, used.gyro_random_walk)
-    return _Found(answer, unchecked, fine.settled, way=way)
+    # The fit takes the arm from the axis, and leaves no motion: the IMU moves on as it did. What is faster than any base is tilt.
+    moved = own_motion(fine.integrals, fine.C_n0_i, task.position.lat, task.position.alt, RECENT)
+    return _Found(answer, unchecked, fine.settled, way=way, moved=np.minimum(moved, limit("fastest base")))
 
 
 def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) -> _Found:
