@@ -154,3 +154,12 @@ def test_one_array_of_six_columns_is_the_imu_whatever_lies_next_to_it(save):
     record = read_imu(save(dcm=matrix.T, quat=quaternion.T, u=imu.T), rate=100.0, units={"gyro": "rad/s"})
     np.testing.assert_allclose(record.accel, imu[:, :3], rtol=1e-12)
     np.testing.assert_allclose(record.gyro, imu[:, 3:], rtol=1e-12)
+
+
+def test_units_behind_names_that_say_nothing_part_no_columns(tmp_path):
+    rng = np.random.default_rng(8)
+    imu = np.hstack([1e-3 * rng.standard_normal((200, 3)), [0.1, -0.2, 9.8] + 0.02 * rng.standard_normal((200, 3))])
+    head = "c1[rad/s],c2[rad/s],c3[rad/s],c4[m/s2],c5[m/s2],c6[m/s2]"
+    np.savetxt(tmp_path / "log.csv", imu, delimiter=",", header=head, comments="", fmt="%.9f")
+    record = read_imu(tmp_path / "log.csv", rate=100.0, units={"gyro": "rad/s"})
+    np.testing.assert_allclose(record.accel, imu[:, 3:], atol=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 
 import numpy as np
@@ -16,6 +17,8 @@ from truenorth.formats.layout import Layout
 from truenorth.records import COLUMNS, Guess
 
 Array = NDArray[np.float64]
+
+PART = re.compile(r"(.+)\[\d+\]")  # a column of an array, and no unit behind a name
 
 
 def by_behaviour(columns: Columns, layout: Layout) -> Choice:
@@ -74,7 +77,8 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
 
 def _variable(name: str) -> str:
     """The array that a column belongs to, as ``u`` of ``u[3]``; nothing for the columns of a table."""
-    return name.rpartition("[")[0]
+    of_array = PART.fullmatch(name)
+    return of_array[1] if of_array else ""
 
 
 def _pair(
