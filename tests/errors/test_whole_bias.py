@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from truenorth.errors.axes import standing
 from truenorth.errors.model import InsModel
 from truenorth.errors.whole_bias import taken_apart, time_average
 from truenorth.records.specs import imu_spec
-from truenorth.state.layout import BA, BG, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
+from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 from truenorth.state.prior import WholeBiases
 
 SPEC = imu_spec("navigation")
@@ -62,3 +63,28 @@ def test_what_holds_at_the_start_adds_up_again():
     add[BG, MODEL.layout.slice_of(SLOW_GYRO)] = add[BA, MODEL.layout.slice_of(SLOW_ACCEL)] = np.eye(3)
     np.testing.assert_allclose(add @ P @ add.T, P15, rtol=1e-9, atol=1e-25)
     np.testing.assert_allclose((add @ values)[BG.start :], bias)
+
+
+def test_groups_that_are_known_go_on_with_what_ties_them():
+    """Scale factors and misalignments behind the fifteen: with their values and covariances; left out where a model lacks them."""
+    spec = imu_spec("consumer")
+    model = InsModel.from_spec(spec, standing=standing())
+    own = {name: model.layout.slice_of(name) for name in (GYRO_AXES, ACCEL_AXES)}
+    known = {name: np.full(9, 0.001 * (k + 1)) for k, name in enumerate(own)}
+    at = np.concatenate([np.arange(STATES), *(np.arange(s.start, s.stop) for s in own.values())])
+    sigma = np.concatenate([np.full(BG.start, 0.01), np.sqrt(spec.bias_variance), np.full(18, 0.005)])
+    mixed = np.random.default_rng(3).standard_normal((33, 40))
+    joint = np.corrcoef(mixed) * np.outer(sigma, sigma)
+    bias, whole = 0.5 * np.sqrt(spec.bias_variance), WholeBiases(spec.constant_variance)
+    P, values = taken_apart(model, joint, bias, whole, known)
+    add = np.eye(model.states)[at]
+    add[BG, model.layout.slice_of(SLOW_GYRO)] = add[BA, model.layout.slice_of(SLOW_ACCEL)] = np.eye(3)
+    got = add @ P @ add.T
+    free = np.ones(33, bool)
+    free[BG.start : BA.stop] = False  # the whole biases here are known worse than a priori in some directions
+    np.testing.assert_allclose(got[np.ix_(free, free)], joint[np.ix_(free, free)], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(got[~free][:, free], joint[~free][:, free], rtol=1e-9, atol=1e-15)
+    for name, there in own.items():
+        np.testing.assert_array_equal(values[there], known[name])
+    plain, without = taken_apart(MODEL, joint, bias, whole, known), taken_apart(MODEL, joint[:15, :15], bias, whole)
+    np.testing.assert_allclose(plain[0], without[0], rtol=1e-12, atol=0)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.earth import radii
-from truenorth.state.layout import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
+from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 
 if TYPE_CHECKING:
     from truenorth.state.track import Track
@@ -53,8 +53,8 @@ class Moving:
     Attributes
     ----------
     v_n : (3,) array, m/s
-    P : (15, 15) array
-        Covariance of phi, dv, dp, gyro and accelerometer bias (:mod:`truenorth.errors.ins`).
+    P : (15 + m, 15 + m) array
+        Covariance of phi, dv, dp, gyro and accelerometer bias (:mod:`truenorth.errors.ins`), and of `axes` behind them.
     distance : float, m
         Travelled.
     heading_from : str
@@ -67,6 +67,9 @@ class Moving:
         The whole way.
     delays : mapping of sensor to (delay, sigma), s
         By which a sensor's stamps are late, where that was left open and the data show it.
+    axes : mapping of name to (m,) values
+        The IMU's scale factors and misalignments, where they were estimated (:mod:`truenorth.errors.axes`). What pushes an
+        accelerometer that is askew looks like a tilt: both are known together.
     """
 
     v_n: Array
@@ -79,6 +82,7 @@ class Moving:
     vehicle_heading_sigma: float
     track: Track
     delays: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    axes: Mapping[str, Array] = field(default_factory=dict)
 
     def less_sure(self, heading: float, level: float = 0.0, velocity: float = 1.0, position: float = 1.0) -> Moving:
         """The same state with these variances (rad^2) added to heading and level, and sigmas so many times as large."""
@@ -150,11 +154,11 @@ def _signed(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def fifteen(track: Track) -> Array:
-    """(K, 15, 15) covariance of phi, dv, dp and the whole biases, their slow parts included."""
+def fifteen(track: Track, *others: slice) -> Array:
+    """(K, 15, 15) covariance of phi, dv, dp and the whole biases, their slow parts included; `others` of the states behind."""
     layout = track.layout
-    M = np.zeros((STATES, layout.states))
-    M[:, :STATES] = np.eye(STATES)
+    kept = np.concatenate([np.arange(STATES), *(np.arange(own.start, own.stop) for own in others)])
+    M = np.eye(layout.states)[kept]
     for group, slow in ((BG, SLOW_GYRO), (BA, SLOW_ACCEL)):
         own = layout.slice_of(slow)
         if own is not None:
@@ -182,7 +186,10 @@ def wheel_of(track: Track, sensor: str, C_mb: Array, lever_arm: Array) -> Wheel:
 
 def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[str, Array, Array] | None) -> Moving:
     """The rest of the state at the end of a track; `mounting` names the odometer or log: ``C_mb`` and lever arm as assumed."""
-    P, C_nb = fifteen(track)[-1], track.C_nb[-1]
+    last = track[-1:]
+    found = {name: track.layout.slice_of(name) for name in (GYRO_AXES, ACCEL_AXES)}
+    axes = {name: own for name, own in found.items() if own is not None}
+    P, C_nb = fifteen(last, *axes.values())[0], track.C_nb[-1]
     wheel = None if mounting is None else wheel_of(track, *mounting)
     C_mb = np.eye(3) if wheel is None else wheel.C_mb
     forward = C_nb @ C_mb[1]
@@ -204,4 +211,5 @@ def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[
         vehicle_heading=float(np.arctan2(forward[0], forward[1]) % (2.0 * np.pi)),
         vehicle_heading_sigma=float(np.sqrt(variance)),
         track=track,
+        axes={name: track.sensors[-1, own] for name, own in axes.items()},
     )

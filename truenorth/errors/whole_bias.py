@@ -12,6 +12,8 @@ the data say of ``c`` and ``w(T)``, they say through m alone: both follow from i
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,7 @@ from truenorth.state.prior import WholeBiases
 
 Array = NDArray[np.float64]
 
+NONE_KNOWN: Mapping[str, Array] = MappingProxyType({})
 SHORT = 1e-3  # of the correlation time: a process does not change in less
 
 
@@ -32,15 +35,19 @@ def time_average(x: float) -> tuple[float, float]:
     return 2.0 * (x - 1.0 + math.exp(-x)) / x**2, (1.0 - math.exp(-x)) / x
 
 
-def taken_apart(model: InsModel, P15: Array, bias: Array, whole: WholeBiases) -> tuple[Array, Array]:
+def taken_apart(
+    model: InsModel, P: Array, bias: Array, whole: WholeBiases, known: Mapping[str, Array] = NONE_KNOWN
+) -> tuple[Array, Array]:
     """Covariance and values at the start of a model whose slow biases are states of their own.
 
     Parameters
     ----------
-    P15 : (15, 15) array
-        Of phi, dv, dp and the whole biases.
+    P : (15 + m, 15 + m) array
+        Of phi, dv, dp and the whole biases, and of the known groups behind them.
     bias : (6,) array
         The whole biases, gyro and accelerometer.
+    known : mapping of name to values
+        Groups that have been estimated, in the order in which they stand in P; what the model does not have is left out.
 
     Returns
     -------
@@ -48,24 +55,31 @@ def taken_apart(model: InsModel, P15: Array, bias: Array, whole: WholeBiases) ->
     values : (n,) array
         In the places of the states; zero where those are no biases.
     """
-    M, values = np.eye(model.states, STATES), np.zeros(model.states)
+    M, values = np.eye(model.states, len(P)), np.zeros(model.states)
+    M[STATES:, STATES:] = 0.0
     values[BG.start : BA.stop] = bias
-    P = model.prior(np.zeros((STATES, STATES)))
+    own = model.prior(np.zeros((STATES, STATES)))
+    at = STATES
+    for name, found in known.items():
+        there, at = slice(at, at + len(found)), at + len(found)
+        here = model.layout.slice_of(name)
+        if here is not None:
+            M[here, there], values[here], own[here, here] = np.eye(len(found)), found, 0.0
     for group, name, c in ((BG, SLOW_GYRO, whole.constant[:3]), (BA, SLOW_ACCEL, whole.constant[3:])):
         slow = model.layout.slice_of(name)
         if slow is None:
             continue
-        s = np.diag(P)[slow].copy()
+        s = np.diag(own)[slow].copy()
         process = model.groups[model.layout.names.index(name)]
         mean, late = time_average(whole.averaged / process.lasts[0])
         said = c + mean * s  # variance a priori of what the data see
         a, b = c / said, late * s / said
         M[group, group], M[slow, group] = np.diag(a), np.diag(b)
-        P[group, group] = np.diag(c * (1.0 - a))
-        P[slow, slow] = np.diag(s * (1.0 - late * b))
-        P[group, slow] = P[slow, group] = np.diag(-c * b)
+        own[group, group] = np.diag(c * (1.0 - a))
+        own[slow, slow] = np.diag(s * (1.0 - late * b))
+        own[group, slow] = own[slow, group] = np.diag(-c * b)
         values[slow] = b * values[group]
         values[group] = a * values[group]
-    held = np.ones(STATES)
+    held = np.ones(len(P))
     held[5] = 0.0 if model.fixed_altitude else 1.0
-    return M @ (P15 * np.outer(held, held)) @ M.T + P, values
+    return M @ (P * np.outer(held, held)) @ M.T + own, values

@@ -21,7 +21,6 @@ from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
 from truenorth.alignment import Alignment
 from truenorth.core.errors import DataError, UsageError
-from truenorth.errors.axes import standing
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.gaps import LONGEST_BRIDGE
@@ -37,6 +36,7 @@ from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.given import kept_altitude, mountings_found, turns_velocity
 from truenorth.navigation.procedure import FINE, PLUMB_LINE, start_of
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
+from truenorth.navigation.start import force_at_rest
 from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
@@ -274,7 +274,7 @@ class Navigator:
         sources += [Aiding.disturbance("gap"), Aiding.disturbance("noise")]
         noise, fixed = self.spec.with_random_walks(self._interval), self.altitude == "fixed"
         model = InsModel.from_spec(
-            noise, standing=standing(self.start.C_nb), groups=PLUMB_LINE.groups, fixed_altitude=fixed
+            noise, standing=force_at_rest(self.start), groups=PLUMB_LINE.groups, fixed_altitude=fixed
         )
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
         turns = turns_velocity(self.altitude)

@@ -15,7 +15,6 @@ from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
-from truenorth.errors.axes import standing
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
@@ -37,7 +36,7 @@ from truenorth.navigation.given import (
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
-from truenorth.navigation.start import read_start, start_from_alignment
+from truenorth.navigation.start import force_at_rest, read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
@@ -201,7 +200,7 @@ def _counted_whole(track: Track, asked: Mapping[str, Any]) -> Track:
 
 def _model(begin: Start, noise: ImuSpec, groups: tuple[Group, ...], every_axis: bool, height: Altitude) -> InsModel:
     """The INS of a specification, with these groups, as it stands at the start."""
-    force, fixed = standing(begin.C_nb), height == "fixed"
+    force, fixed = force_at_rest(begin), height == "fixed"
     return InsModel.from_spec(noise, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
 
 

@@ -59,7 +59,9 @@ def start_from_alignment(alignment: Alignment) -> Start:
             alignment.position,
             alignment.imu,
         )
-        return start if alignment.moving is None else _with_sensors(start, alignment.moving.summary())
+        if alignment.moving is None:
+            return start
+        return _with_sensors(replace(start, axes=alignment.moving.axes), alignment.moving.summary())
     joint = alignment.handover
     if joint is None:
         joint = _by_static_limits(
@@ -155,6 +157,11 @@ def moving_start(
     return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)
 
 
+def force_at_rest(start: Start) -> Array:
+    """(3,) m/s^2, body axes; on what differs from it the accelerometers' axes act: as the IMU stands, or as they were estimated."""
+    return standing() if start.axes else standing(start.C_nb)
+
+
 def _with_sensors(start: Start, summary: Mapping[str, Any]) -> Start:
     """The start with what an alignment on the move has found of its sensors: how the odometer sits, how late both are."""
     return replace(start, wheel=_found_wheel(summary), gnss_delay=_found_delay(summary, "GNSS"))
@@ -223,7 +230,8 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
             v_n, P = _finite(n["v_n"]), _finite(n["P"])
             biases = numbers["gyro_bias"], numbers["accel_bias"]
             start = moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
-            start = _with_sensors(start, s)
+            axes = {str(name): _finite(values) for name, values in n.get("axes", {}).items()}
+            start = _with_sensors(replace(start, axes=axes), s)
         else:
             gyro_bias = numbers.pop("gyro_bias")
             if "handover" in n:
@@ -269,4 +277,6 @@ def navigation_block(alignment: Alignment) -> dict[str, Any]:
     moving = alignment.moving or alignment.transfer
     if moving is not None:
         block |= {"v_n": moving.v_n.tolist(), "P": moving.P.tolist()}
+    if alignment.moving is not None:
+        block["axes"] = {name: values.tolist() for name, values in alignment.moving.axes.items()}
     return block

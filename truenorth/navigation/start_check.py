@@ -57,9 +57,10 @@ def check_start(start: Start) -> None:
         )
     variance = np.diag(P)
     scale = np.sqrt(np.outer(np.abs(variance), np.abs(variance)))
-    if P.shape != (STATES, STATES) or np.any(np.abs(P - P.T) > SYMMETRIC * scale.max()):
+    states = STATES + sum(map(len, start.axes.values()))
+    if P.shape != (states, states) or np.any(np.abs(P - P.T) > SYMMETRIC * scale.max()):
         raise DataError(
-            f"start: the covariance P is not symmetric; expected ({STATES}, {STATES}), symmetric: align anew"
+            f"start: the covariance P is not symmetric; expected ({states}, {states}), symmetric: align anew"
         )
     known = variance > 0.0
     unit = P[np.ix_(known, known)] / scale[np.ix_(known, known)]

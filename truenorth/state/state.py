@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import SupportsFloat
 
 import numpy as np
@@ -59,6 +60,9 @@ class Start(State):
         By which that alignment found the receiver's stamps to be late.
     plumb : float, rad
         One-sigma deflection of the vertical that P holds as tilt and accelerometer bias that cancel each other; 0: none.
+    axes : mapping of name to (m,) values
+        Groups of the IMU's scale factors and misalignments that an alignment on the move has estimated
+        (:mod:`truenorth.errors.axes`): they stand behind the fifteen in P, in this order.
     """
 
     P: Array
@@ -66,6 +70,7 @@ class Start(State):
     wheel: Mounting | None = None
     gnss_delay: tuple[float, float] | None = None
     plumb: float = 0.0
+    axes: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, state: State, P: Array) -> Start:
