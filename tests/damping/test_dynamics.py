@@ -1,16 +1,24 @@
 """The 13-state error model against the strapdown navigation itself, over two days."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from benchmarks.honesty.voyage import passage
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth, navigate, paper_errors
 from tests.runs import some
 from truenorth.core.errors import DataError
 from truenorth.damping.course import errors_of, linearised
 from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import first_order
-from truenorth.errors.marine import BA, BG, DP, MarineModel, position_in_angles
+from truenorth.errors.axes import accel_axes, gyro_axes, standing
+from truenorth.errors.marine import BA, BG, DP, DV, PHI, MarineModel, position_in_angles
+from truenorth.records.specs import ImuSpec
+from truenorth.simulation import simulate
+from truenorth.state.state import State
 from truenorth.state.track import Track
+from truenorth.strapdown.level import mechanise
 
 QUIET = MarineModel(0.0, 0.0)
 STATES = ["phi_e", "phi_n", "phi_u", "v_e", "v_n", "p_e", "p_n", "bg_x", "bg_y", "bg_z", "ba_x", "ba_y", "ba_z"]
@@ -73,3 +81,30 @@ def test_uneven_epochs_are_refused():
         network_correction(course, Loop(first_order(0.5)))
     with pytest.raises(DataError, match="a track of 1 epochs; expected two"):
         network_correction(course[:1], Loop(first_order(0.5)))
+
+
+@pytest.mark.parametrize("sensor", ["gyro", "accel"])
+def test_axes_of_the_imu_act_in_turns(sensor):
+    """A ship that turns by 1 deg/s, nine elements of M at once: as the strapdown of such an IMU, to 2 % of the largest."""
+    ideal, truth = passage(np.random.default_rng(4), 1.5)
+    M = 1e-4 * np.random.default_rng(5).standard_normal((3, 3))
+    force = standing()
+    group = gyro_axes(ImuSpec()) if sensor == "gyro" else accel_axes(ImuSpec(), force)
+    model = MarineModel(0.0, 0.0, groups=(group,))
+    record = simulate(ideal).record
+    rows = getattr(record, sensor) - (0.0 if sensor == "gyro" else record.interval * force)
+    spoilt = replace(record, **{sensor: getattr(record, sensor) + rows @ M.T})
+    start = State.at(truth.C_nb[0], *truth.position[0], truth.v_n[0])
+    tracks = []
+    for log in (record, spoilt):
+        out = mechanise(log, start, altitude="fixed")
+        tracks.append(replace(truth[1:], C_nb=out.C_nb, v_n=out.v_n, position=out.position))
+    found = errors_of(tracks[1], tracks[0])
+    x = np.concatenate([np.zeros(13), M.ravel()])
+    _, Phi = linearised(truth, model)
+    for step in Phi:
+        x = step @ x
+    for part in (PHI, DV, DP):
+        size = np.abs(found[:, part]).max()
+        assert size > 0.0
+        np.testing.assert_allclose(x[part], found[-1, part], rtol=0, atol=0.02 * size)

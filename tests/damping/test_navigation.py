@@ -253,8 +253,8 @@ def test_a_log_in_body_axes_mounted_askew(ship):
     two = navigate(ship.record, ship.start, aid=askew, **options)
     late = one.time > 12 * 3600.0
     assert np.abs(one.v_n - two.v_n)[late].max() < 0.05  # the INS's heading error of .1 deg turns 12.8 m/s by .02
-    with pytest.raises(UsageError, match="no lever arm"):
-        navigate(ship.record, ship.start, aid=VelocityLog(body, Mounting(lever_arm=np.array([0, 1.0, 0]))), **options)
+    with pytest.raises(UsageError, match="its arm alone"):
+        navigate(ship.record, ship.start, aid=VelocityLog(body, Mounting(scale_sigma=0.01)), **options)
     with pytest.raises(UsageError, match="expected 10 s at most"):
         navigate(ship.record, ship.start, aid=VelocityLog(body), **options | {"output": 40.0})
 

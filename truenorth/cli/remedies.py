@@ -38,6 +38,7 @@ OPTIONS = {
     "flexure": "--flexure",
     "log_error": "--log-drift",
     "log_kind": "--log-kind",
+    "log_arm": "--wheel-arm",
 }
 OF_A_START = {"place": "--position", "height": "--position"}  # of a navigation, which has no place but its start's
 

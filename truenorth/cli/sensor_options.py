@@ -102,7 +102,7 @@ class Sensors:
     lever_arm: Annotated[str | None, option("IMU to GNSS antenna, m: right,forward,up."), Sets("antenna", arm)] = None
     baseline: Baseline = None
     wheel_arm: Annotated[
-        str | None, option("IMU to the odometer's wheel, m: right,forward,up."), Sets("wheel", arm)
+        str | None, option("IMU to the odometer's wheel or the log, m: right,forward,up."), Sets("wheel", arm)
     ] = None
     mounting: Annotated[
         str | None,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.damping.bands import Bands
 from truenorth.damping.filters import Estimate
+from truenorth.damping.log_arm import Arm
 from truenorth.damping.reference import Reference
 from truenorth.damping.result import LogHistory
 from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
@@ -20,6 +21,7 @@ from truenorth.errors.log import LogErrors
 from truenorth.errors.marine import BA, BG, MOTION, OF_INS, STATES
 from truenorth.state import layout as ins
 from truenorth.state.evidence import Evidence, note
+from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
 from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
@@ -30,11 +32,12 @@ LEVEL = OF_INS[MOTION]
 
 
 class LogOn(NamedTuple):
-    """A speed log on a course: what it says, what it may be wrong by, and whether the INS has turned it."""
+    """A speed log on a course: what it says, what it may be wrong by, whether the INS has turned it, its arm if sought."""
 
     reference: Reference | None
     errors: LogErrors
     turned: bool
+    arm: Arm | None
 
 
 class Found(NamedTuple):
@@ -57,13 +60,15 @@ def switched(found: Switching, time: Array) -> Evidence:
 
 
 def history_of(course: Track, estimate: Estimate | None, groups: Sequence[Group]) -> LogHistory | None:
-    """What the filter found of the log, epoch by epoch; None where no filter ran."""
+    """What the filter found of the log and the plumb line, epoch by epoch; None where no filter ran."""
     if estimate is None:
         return None
+    groups = [group for group in groups if group.name not in (GYRO_AXES, ACCEL_AXES)]  # the last
     names = tuple(group.name for group in groups for _ in group.prior)
     units = tuple(group.unit for group in groups for _ in group.prior)
     time = course.time[estimate.start :]
-    return LogHistory(time, names, units, estimate.x[:, STATES:], estimate.sigma[:, STATES:])
+    own = slice(STATES, STATES + len(names))
+    return LogHistory(time, names, units, estimate.x[:, own], estimate.sigma[:, own])
 
 
 def residuals_of(course: Track, log: LogOn, damped: Track, found: Found, start: int) -> list[Residuals]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core import earth
-from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.errors.intervals import Intervals
 from truenorth.errors.marine import DP, DV, MOTION, OF_INS, PHI, MarineModel
 from truenorth.records.interpolation import Between
@@ -47,13 +47,20 @@ def place_at(course: Track, time: float) -> tuple[float, float, float]:
 def linearised(course: Track, model: MarineModel) -> tuple[Array, Array]:
     """``F`` and ``Phi`` (K, n, n) of each interval, about the means of its ends.
 
-    The specific force is what has changed the velocity: ``f = dv/dt + (2 w_ie + w_en) x v - g``.
+    The specific force is what has changed the velocity: ``f = dv/dt + (2 w_ie + w_en) x v - g``; the rate is what has turned the
+    attitude, ``w_ib = w_nb + C' (w_ie + w_en)``.
     """
     v, C, position = (0.5 * (a[1:] + a[:-1]) for a in (course.v_n, course.C_nb, course.position))
     lat, alt = position[:, 0], position[:, 2]
-    w = 2.0 * earth.earth_rate_n(lat) + earth.transport_rate_n(lat, alt, v)
-    f = np.diff(course.v_n, axis=0) / course.interval + np.cross(w, v) - earth.gravity_n(lat, alt)
-    return model.linearise(Intervals(np.full(len(v), course.interval), C, f, v, lat, alt))
+    earth_rate, transport = earth.earth_rate_n(lat), earth.transport_rate_n(lat, alt, v)
+    f = (
+        np.diff(course.v_n, axis=0) / course.interval
+        + np.cross(2.0 * earth_rate + transport, v)
+        - earth.gravity_n(lat, alt)
+    )
+    turn = rotation_vector_from_dcm(np.swapaxes(course.C_nb[:-1], 1, 2) @ course.C_nb[1:])
+    w_b = turn / course.interval + np.einsum("kji,kj->ki", C, earth_rate + transport)
+    return model.linearise(Intervals(np.full(len(v), course.interval), C, f, v, lat, alt, w_b))
 
 
 def without_errors(course: Track, x: Array) -> Track:

@@ -7,7 +7,8 @@ under one too fast S is larger than they are.
 The walk of the drift, ``sigma^2/tau``, shows within hours, its size ``sigma`` only over several ``tau``: the time is searched
 with the size as it is given, then both along the same walk, where a size twice the given one costs half a unit of
 log-likelihood. A drift that is taken for a constant while it wanders is believed far beyond its sigma, one that is taken for
-too fast costs a little of it: of walks within one sigma of the most likely one the fastest is taken.
+too fast costs a little of it: of walks within one sigma of the most likely one the fastest is taken. So with the size: a tide is
+no Gauss-Markov process, and its turns within hours say little of how large it is; of sizes within two sigmas the largest is taken.
 
 A current that the sea has changes smoothly over minutes, and over hours it wanders. From row to row it is a constant, which the
 errors of the INS follow, whatever it is over hours. And what wanders in an hour may be the deflection of the vertical. So the same
@@ -41,11 +42,13 @@ SIZES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)  # times the given one
 DOUBT = math.log(2.0)  # one sigma of the logarithm of the size
 # Of log-likelihood, by which a faster walk may be less likely than a slower one and is taken all the same:
 AS_LIKELY = 0.5  # one sigma
-AS_LIKELY_APART = 2.0  # two: few rows say little
+AS_LIKELY_APART = 2.0  # two: few rows say little, and all of them little of the size
 DISTINCT = 8.0  # four sigmas, between the slowest walk and the fastest: rows that say less do not count
 
 
-def likely_drift(course: Track, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:
+def likely_drift(
+    course: Track, reference: Array, start: int, kind: Filter, given: LogErrors, means: Track | None = None
+) -> LogErrors:
     """The log's errors with the most likely size and correlation time of its drift; an infinite time: a constant.
 
     Parameters
@@ -57,38 +60,49 @@ def likely_drift(course: Track, reference: Array, start: int, kind: Filter, give
     kind : Filter
         The augmented filter; size and time of its drift are set in turn.
     given : LogErrors
+    means : Track, optional
+        By which the log shows its errors, as for :func:`run_filters`.
     """
-    stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
+    stride = _stride(course, reference[start:])
     coarse, seen = course[start::stride], reference[start::stride]
+    shown = None if means is None else means[start::stride]
     sparse = np.full_like(seen, np.nan)
     every = max(1, round(SMOOTH / coarse.interval))
     sparse[::every] = seen[::every]
 
-    def best(rows: Array, base: Filter, pairs: list[Pair], slack: float = 0.0, seen: Pair | None = None) -> Pair:
-        """The fastest walk that is as likely as the likeliest but for `slack`; `seen`, where the rows hardly tell any apart."""
+    def as_likely(rows: Array, base: Filter, pairs: list[Pair], slack: float) -> tuple[list[Pair], float]:
+        """Those that are as likely as the likeliest but for `slack`, and how much less likely the least likely one is."""
         kinds = {str(pair): _with(base, *pair) for pair in pairs}
-        found = run_filters(coarse, rows, start=0, kinds=kinds)
+        found = run_filters(coarse, rows, start=0, kinds=kinds, seen=shown)
 
         def weighed(pair: Pair) -> float:
             doubt = math.log(pair[0] / given.drift) / DOUBT
             return found[str(pair)].likelihood - 0.5 * doubt**2
 
         most = max(map(weighed, pairs))
-        if seen and most - min(map(weighed, pairs)) < DISTINCT:
-            return seen
-        return max((pair for pair in pairs if weighed(pair) >= most - slack), key=lambda p: (_walk(p), weighed(p)))
+        return [pair for pair in pairs if weighed(pair) >= most - slack], most - min(map(weighed, pairs))
 
     def sized(rows: Array, base: Filter, pair: Pair) -> Pair:
         size, time = pair
-        return best(rows, base, [(size * f, time * f**2) for f in SIZES]) if math.isfinite(time) else pair
+        if math.isinf(time):
+            return pair
+        return max(as_likely(rows, base, [(size * f, time * f**2) for f in SIZES], AS_LIKELY_APART)[0])
 
     times = [(given.drift, time) for time in TIMES]
-    walk = sized(seen, kind, best(seen, kind, times, AS_LIKELY))
+    walk = sized(seen, kind, max(as_likely(seen, kind, times, AS_LIKELY)[0], key=_walk))
     still = _with_sigma(kind, DEFLECTION, NO_DEFLECTION)
-    apart = best(sparse, still, times, AS_LIKELY_APART, walk)
-    if _walk(apart) > _walk(walk):
+    likely, spread = as_likely(sparse, still, times, AS_LIKELY_APART)
+    if spread >= DISTINCT and _walk(apart := max(likely, key=_walk)) > _walk(walk):
         walk = sized(sparse, still, apart)
     return replace(given, drift=walk[0], drift_time=walk[1])
+
+
+def _stride(course: Track, reference: Array) -> int:
+    """Epochs from one that is taken to the next: as far apart as the filter allows, with each row of a log that has few."""
+    most = max(1, int(LONGEST_STEP / course.interval + 1e-9))
+    rows = np.flatnonzero(np.isfinite(reference).all(axis=1))
+    apart = math.gcd(*(int(k) for k in rows)) if len(rows) else 0
+    return max(k for k in range(1, most + 1) if apart % k == 0) if apart > 1 else most
 
 
 def _walk(pair: Pair) -> float:

@@ -147,9 +147,11 @@ class Filter:
 class _Stream:
     """A filter that is fed block by block."""
 
-    def __init__(self, kind: Filter, course: Track, start: int) -> None:
+    def __init__(self, kind: Filter, course: Track, start: int, seen: Track | None, about: Array | None) -> None:
         self.kind, self.lag, self.interval = kind, kind.lag(course.interval), course.interval
+        self.seen = None if seen is None else seen[start:]
         count, n = len(course) - start, kind.model.states
+        self.about = np.zeros((count, MOTION.stop)) if about is None else about
         self.x, self.sigma, self.used = np.zeros((count, n)), np.empty((count, n)), np.full((count, 2), np.nan)
         self.sigma[0] = np.sqrt(np.diagonal(kind.P0))
         self.innovation, self.innovation_sigma = np.full((count, 2), np.nan), np.full((count, 2), np.nan)
@@ -164,15 +166,18 @@ class _Stream:
                 end = min(begin + FRESH, len(z))
                 self.feed(part[begin : end + 1], z[begin:end])
             return
+        epochs = slice(self.done - 1, self.done + len(z))
+        known = self.about[epochs]
         if self.kind.relinearise:
             last = self.x[self.done - 1, MOTION]
             before = self.x[max(self.done - len(part), 0), MOTION]
             ahead = last + (last - before if self.done > FRESH else 0.0) / 2.0  # at the middle of these epochs
-            part = without_errors(part, ahead / 2.0)
+            known = ahead / 2.0
+            part = without_errors(part, known)
         F, Phi = linearised(part, self.kind.model) if linear is None else linear
         n, K = self.kind.model.states, len(Phi)
         if self.lag == 0:
-            H = self.kind.rows(part)
+            H = self.kind.rows(part if self.seen is None else without_errors(self.seen[epochs], known))
         else:
             rows = np.concatenate([self.rows, F[:, DV, :n]])
             total = np.concatenate([np.zeros((1, 2, n)), np.cumsum(rows, axis=0)])
@@ -244,6 +249,7 @@ def run_filters(
     kinds: Mapping[str, Filter],
     workers: int = 1,
     about: Array | None = None,
+    seen: Track | None = None,
 ) -> dict[str, Estimate]:
     """Run filters over a course, all switched on at one epoch.
 
@@ -262,6 +268,8 @@ def run_filters(
     about : (K+1-start, 7) array, optional
         Errors as they are known already: the dynamics are taken midway between the computed course and the one without them, and
         what the log shows, which is linear in the true velocity, on the one without them. No filter then re-linearises.
+    seen : Track, optional
+        Attitude and velocity by which the log shows its errors, where these are means (:mod:`truenorth.damping.waves`).
 
     Raises
     ------
@@ -274,7 +282,7 @@ def run_filters(
         raise UsageError(f"start at epoch {start}; expected 0 to {len(course) - 2}")
     if about is not None:
         kinds = {name: replace(kind, relinearise=False) for name, kind in kinds.items()}
-    streams = {name: _Stream(kind, course, start) for name, kind in kinds.items()}
+    streams = {name: _Stream(kind, course, start, seen, about) for name, kind in kinds.items()}
     z = course.v_n[:, :2] - reference
     interval = course.interval
     settling = max(1, round(SETTLING / interval))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,12 +29,14 @@ from truenorth.damping.bands import filter_bands, network_bands
 from truenorth.damping.course import motion_at, place_at, without_errors
 from truenorth.damping.drift import likely_drift
 from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
+from truenorth.damping.log_arm import at_the_imu
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, first_order, second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import LEAST_NOISE, Reference, reference_of
 from truenorth.damping.result import Damping
 from truenorth.damping.switching import switching
+from truenorth.damping.waves import over_waves
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors, log_errors, log_rows
@@ -43,7 +46,7 @@ from truenorth.quality.innovations import innovation_evidence, residual_evidence
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction, note
-from truenorth.state.layout import DV
+from truenorth.state.layout import ACCEL_AXES, DV, GYRO_AXES
 from truenorth.state.limits import limit
 
 if TYPE_CHECKING:
@@ -53,6 +56,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+OF_COURSE = (DEFLECTION, GYRO_AXES, ACCEL_AXES)  # groups of the free INS that go on
 WINDOW = 5.0  # s, of filter 2
 LEAST_WALK = 1e-5  # m/s/sqrt(s), of an IMU without noise
 
@@ -73,12 +77,13 @@ def damp_navigation(
     result : Navigation
         Without aiding, its height held.
     velocity : VelocityLog, optional
-        Needed by all methods but ``none`` and ``internal``. Of its mounting, the angles of a log in body axes and the latency.
+        Needed by all methods but ``none`` and ``internal``. Of its mounting, the angles of a log in body axes, its arm and its
+        latency.
     spec : ImuSpec
         Of the IMU: noise of the filters and of the bands.
     damper : Damper
     others : sequence of Group
-        Further error states of the navigation; of these the deflection of the vertical is known here.
+        Further error states of the navigation; of these the deflection of the vertical and the IMU's axes are known here.
     fixes : Fixes
         From outside; method ``augmented`` takes them.
     fine : Track, optional
@@ -93,7 +98,7 @@ def damp_navigation(
     ------
     UsageError
         No velocity log where one is needed; a navigation that was aided, whose height was free, or whose epochs are far apart;
-        a mounting with a lever arm, or with something to be estimated.
+        a mounting of which more than the arm is to be estimated.
     DataError
         Uneven epochs; a log that does not overlap; a switch after the end.
     """
@@ -105,8 +110,8 @@ def damp_navigation(
         raise UsageError(f"damping {damper.method} needs a reference velocity; expected velocity=record")
     if (fixes.positions or fixes.azimuths) and damper.method != "augmented":
         raise UsageError(f"fixes with damping {damper.method}; expected damping augmented, whose filter can weigh them")
-    if strange := [group.name for group in others if group.name != DEFLECTION]:
-        raise UsageError(f"damping with error states {', '.join(strange)}; expected {DEFLECTION!r} alone")
+    if strange := [group.name for group in others if group.name not in OF_COURSE]:
+        raise UsageError(f"damping with error states {', '.join(strange)}; expected {', '.join(OF_COURSE)} alone")
     course = even(result.track)
     if course.interval > LONGEST_STEP * 1.01:
         raise UsageError(
@@ -120,7 +125,7 @@ def damp_navigation(
             "earlier start"
         )
     finest = course if fine is None else even(fine)
-    log = LogOn(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity, finest)
+    log = LogOn(None, LogErrors(0.0), False, None) if velocity is None else _log_on(course, velocity, finest)
     errors, evidence = _with_drift(course, log, spec, others, start)
     whole = replace(_whole(course, log, errors, spec, others, start), fixes=_fixes_on(course, finest, fixes, start))
     found = _damped(course, log.reference, spec, damper, start, whole, errors)
@@ -148,6 +153,7 @@ def damp_navigation(
     evidence = [*result.evidence, *evidence]
     if log.reference is not None:
         evidence += log.reference.evidence()
+        evidence += [] if log.arm is None else log.arm.evidence()
         if damper.needs_reference:
             evidence += _contradiction(course, log.reference, log.errors, start)
     evidence += [] if not report.rejected else [note("log.rejected", count=report.rejected)]
@@ -167,7 +173,8 @@ def damp_navigation(
 def _log_on(course: Track, velocity: VelocityLog, seen: Track) -> LogOn:
     record = _mounted(velocity.record, velocity.mounting)
     errors = log_errors(velocity.errors, record.frame)
-    return LogOn(reference_of(course, record, errors, seen), errors, record.frame == "body")
+    record, arm = at_the_imu(seen, record, velocity.mounting, errors)
+    return LogOn(reference_of(course, record, errors, seen), errors, record.frame == "body", arm)
 
 
 def _fixes_on(course: Track, seen: Track, fixes: Fixes, start: int) -> FixRows | None:
@@ -202,7 +209,8 @@ def _with_drift(
     if log.reference is None or errors.drift == 0.0 or errors.drift_time is not None:
         return errors, []
     kind = _whole(course, log, errors, spec, others, start)
-    found = likely_drift(course, log.reference.velocity, start, kind, errors)
+    calm = over_waves(course, log.reference.velocity, log.reference.noise, start)
+    found = likely_drift(course, calm.velocity, start, replace(kind, sigma=calm.noise), errors, calm.course)
     if math.isinf(found.time):
         return found, [note("log.constant")]
     return found, [note("log.drifts", drift=found.drift, hours=found.time / 3600.0)]
@@ -212,10 +220,11 @@ def _whole(course: Track, log: LogOn, errors: LogErrors, spec: ImuSpec, others: 
     """All errors of INS and log at the switch."""
     model = MarineModel.from_spec(spec, (*errors.groups(), *others))
     places, rows = list(range(STATES)), OF_INS.tolist()
-    deflected, there = model.slice_of(DEFLECTION), course.layout.slice_of(DEFLECTION)
-    if deflected is not None and there is not None:
-        places += range(deflected.start, deflected.stop)
-        rows += range(there.start, there.stop)
+    for name in OF_COURSE:
+        own, there = model.slice_of(name), course.layout.slice_of(name)
+        if own is not None and there is not None:
+            places += range(own.start, own.stop)
+            rows += range(there.start, there.stop)
     P = model.prior(np.zeros((STATES, STATES)))
     P[np.ix_(places, places)] = course.P[start][np.ix_(rows, rows)]
     noise = LEAST_NOISE if log.reference is None else log.reference.noise
@@ -244,10 +253,10 @@ def _mounted(velocity: VelocityRecord, mounting: Mounting | None) -> VelocityRec
     """The log along the IMU's axes, on its clock."""
     if mounting is None:
         return velocity
-    unknown = (mounting.lever_arm_sigma, mounting.angle_sigma, mounting.scale_sigma, mounting.latency_sigma)
-    if np.any(mounting.lever_arm) or any(unknown):
+    if any((mounting.angle_sigma, mounting.scale_sigma, mounting.latency_sigma)):
         raise UsageError(
-            "damping takes the log's velocity for the IMU's; expected no lever arm, and nothing of the log to be estimated"
+            "damping estimates of a log's mounting its arm alone; expected angles, scale and latency that are known: what is not "
+            "known of a log is said by LogErrors"
         )
     if velocity.frame == "body" and not np.array_equal(mounting.C_mb, np.eye(3)):
         turned = np.nan_to_num(velocity.velocity) @ mounting.C_mb
@@ -280,9 +289,10 @@ def _damped(
         return _by_network(course, reference, damper, start, whole)
     assert reference is not None  # checked before
     if damper.method == "augmented":
-        kinds = {"augmented": replace(whole, gate=1.0 - limit("log's gate"))}
-        first = run_filters(course, reference.velocity, start=start, kinds=kinds)["augmented"]
-        again = run_filters(course, reference.velocity, start=start, kinds=kinds, about=first.x[:, MOTION])
+        calm = over_waves(course, reference.velocity, reference.noise, start)
+        kinds = {"augmented": replace(whole, gate=1.0 - limit("log's gate"), sigma=calm.noise)}
+        run = partial(run_filters, course, calm.velocity, start=start, kinds=kinds, seen=calm.course)
+        again = run(about=run()["augmented"].x[:, MOTION])
         estimate = again["augmented"]
         x[start:] = estimate.x[:, MOTION]
         return Found(x, None, estimate, None)

@@ -1,4 +1,4 @@
-"""Error model of a marine INS with its height held: 13 states, and groups behind them (errors of the speed log, the plumb line's).
+"""Error model of a marine INS with its height held: 13 states, and groups behind them (speed log, plumb line, the IMU's axes).
 
 States, errors computed minus true:
 
@@ -108,6 +108,11 @@ class MarineModel(Walks):
         return None
 
     @property
+    def _standing(self) -> Array:
+        """(3,) m/s^2, on what differs from which the accelerometers' axes act."""
+        return next(np.array(group.figures[:3]) for group in self.groups if group.name == ins.ACCEL_AXES)
+
+    @property
     def dynamics(self) -> Dynamics:
         """How the groups run by themselves."""
         return dynamics_of(self.groups, np.zeros(ins.STATES))
@@ -154,6 +159,16 @@ class MarineModel(Walks):
             F[:, DV, deflected] = STANDARD_GRAVITY * np.eye(2)
             Phi[:, DV, deflected] = T[:, None, None] * F[:, DV, deflected]
             Phi[:, DP, deflected] = 0.5 * T[:, None, None] * Phi[:, DV, deflected]
+        gyros, accels = self.slice_of(ins.GYRO_AXES), self.slice_of(ins.ACCEL_AXES)
+        if gyros is not None:  # phi' = -C M w; the tilt of a turn drives velocity by F
+            F[:, PHI, gyros] = -(along.C_nb[:, :, :, None] * along.w_ib_b[:, None, None, :]).reshape(len(T), 3, 9)
+            Phi[:, PHI, gyros] = T[:, None, None] * F[:, PHI, gyros]
+            Phi[:, DV, gyros] = 0.5 * T[:, None, None] * (F[:, DV, PHI] @ Phi[:, PHI, gyros])
+        if accels is not None:  # dv' = C M (f - f0)
+            f_b = np.einsum("kji,kj->ki", along.C_nb, along.f_n) - self._standing
+            F[:, DV, accels] = (along.C_nb[:, :2, :, None] * f_b[:, None, None, :]).reshape(len(T), 2, 9)
+            Phi[:, DV, accels] = T[:, None, None] * F[:, DV, accels]
+            Phi[:, DP, accels] = 0.5 * T[:, None, None] * Phi[:, DV, accels]
         return F, Phi
 
 

@@ -50,6 +50,7 @@ from truenorth.quality.slow_aids import Slow, one_less
 from truenorth.records import GnssRecord, ImuRecord, Late
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
+from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -183,11 +184,25 @@ def navigate(
     )
     if damping is None:
         return judged_navigation(result, counted_once(evidence))
+    tell(f"damping: {damping.method}")
+    return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, groups, fixes)
+
+
+def _damped(
+    result: Navigation,
+    plan: Plan,
+    reference: VelocityLog | None,
+    noise: ImuSpec,
+    damping: Damper,
+    groups: tuple[Group, ...],
+    fixes: Fixes,
+) -> Navigation:
+    """A free navigation damped, with the error states that go on."""
     from truenorth.damping.navigation import damp_navigation
 
-    tell(f"damping: {damping.method}")
     fine = plan.finest() if reference is not None and plan.every > 1 else None
-    return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, groups, fixes, fine)
+    known = [group for group in plan.model.groups if group in groups or group.name in (GYRO_AXES, ACCEL_AXES)]
+    return damp_navigation(result, reference, noise, damping, known, fixes, fine)
 
 
 def _counted_whole(track: Track, asked: Mapping[str, Any]) -> Track:

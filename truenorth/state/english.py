@@ -361,6 +361,7 @@ SENTENCES = {
         "velocity log: differs from the free INS by {east:.2f} m/s east, {north:.2f} m/s north (median), {allowed:.2f} m/s is "
         "expected"
     ),
+    "log.arm": "velocity log: it sits {ahead:.1f} m ahead and {right:.1f} m right of the IMU, as turns show (within {sigma:.1f} m)",
     "log.outliers": "velocity log: {count} epochs left out as outliers",
     "log.jump": (
         "velocity log: at {time:.0f} s its level jumps by {east:+.2f} m/s east, {north:+.2f} m/s north; held to the level before"

@@ -52,6 +52,7 @@ REMEDIES = {
     "manoeuvre": "velocity shows heading by horizontal acceleration alone; make a turn, an S-turn, a change of speed",
     "log": "check its units, axes, mounting, and whether it works",
     "log_kind": "say what kind of log it is: doppler-bottom where it sees the ground",
+    "log_arm": "measure the arm from the IMU to the log, and give it",
     "log_error": "check the error that was stated for it",
     "manoeuvre_gnss": "the vehicle must accelerate and turn while GNSS sees it",
     "north": "velocity along the vehicle does not show north; use gyros that see the earth turn, or GNSS",
