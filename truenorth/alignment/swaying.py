@@ -20,8 +20,8 @@ from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.late_gyros import response_to_late_gyros
 from truenorth.alignment.matched import innovations_of, matched
-from truenorth.alignment.motion_fit import fit_motion
-from truenorth.alignment.motion_likelihood import Walks
+from truenorth.alignment.motion_fit import search, with_guess
+from truenorth.alignment.motion_likelihood import Series, Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
 from truenorth.alignment.sway_noise import noisier_sensors
 from truenorth.alignment.swing import may_swing, swings
@@ -117,7 +117,28 @@ class _Fitted:
     residual: Array
 
 
-_Known = dict[tuple[int, AxisMotion | None, bytes], AxisMotion]  # motions that were fitted, by axis, guess and velocity
+class _Fits:
+    """Motions fitted to velocities along E, N, U; a velocity that was searched or fitted is not again."""
+
+    def __init__(self, interval: float, walks: Walks) -> None:
+        self.interval, self.walks = interval, walks
+        self.searched: dict[tuple[int, bytes], tuple[Series, AxisMotion]] = {}
+        self.found: dict[tuple[int, bytes, AxisMotion | None], AxisMotion] = {}
+
+    def __call__(self, residual: Array, guesses: Sequence[AxisMotion] | None = None) -> tuple[AxisMotion, ...]:
+        """To a residual (K, 3), from nothing and from guesses; no quieter than bedrock."""
+        return _no_quieter(
+            self._along(axis, residual[:, axis], None if guesses is None else guesses[axis]) for axis in range(3)
+        )
+
+    def _along(self, axis: int, velocity: Array, guess: AxisMotion | None) -> AxisMotion:
+        seen = axis, velocity.tobytes()
+        if seen not in self.searched:
+            series = Series(velocity, self.interval, self.walks)
+            self.searched[seen] = series, search(series, MOST_OSCILLATORS[axis])
+        if (*seen, guess) not in self.found:
+            self.found[*seen, guess] = with_guess(*self.searched[seen], guess)
+        return self.found[*seen, guess]
 
 
 class _MotionFilter:
@@ -125,14 +146,14 @@ class _MotionFilter:
 
     def __init__(self, residual: Array, interval: float, walks: Walks, fits: int = 1) -> None:
         self.interval, self.walks, self.fits, self.passes = interval, walks, fits, 0
-        self.known: _Known = {}
-        self.motion = _fit(residual, interval, walks, None, self.known)
+        self.fit = _Fits(interval, walks)
+        self.motion = self.fit(residual)
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
         # About a good attitude: what was in the first residual besides the motion is gone.
         if 1 < self.passes <= 1 + self.fits:
-            self.motion = _fit(system.z, self.interval, self.walks, self.motion, self.known)
+            self.motion = self.fit(system.z, self.motion)
         return self.filtered()
 
     def filtered(self) -> Filtered:
@@ -147,8 +168,8 @@ class _MotionFilter:
     def without(self, seen: Array) -> tuple[float, Array]:
         """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""
         left = self.base.with_arrays(z=self.base.z - seen)
-        motion = _fit(left.z, self.interval, self.walks, self.motion, self.known)
-        estimates = kalman(with_motion(left, self.interval, motion))
+        motion = self.fit(left.z, self.motion)
+        estimates = kalman(with_motion(left, self.interval, motion, spare=False))
         return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
 
 
@@ -157,7 +178,7 @@ class _SwingFilter(_MotionFilter):
 
     def __init__(self, plain: _MotionFilter, turns: slice) -> None:
         self.interval, self.walks, self.motion, self.turns = plain.interval, plain.walks, plain.motion, turns
-        self.passes, self.known = 0, {}
+        self.passes, self.fit = 0, _Fits(self.interval, self.walks)
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
@@ -324,24 +345,6 @@ def _prior(start: CoarseStart, mount: Mount, turned: ImuSpec | None, slow_arm: f
         offset_sigma=mount.offset_sigma,
         slow_arm_sigma=slow_arm,
     )
-
-
-def _fit(
-    residual: Array,
-    interval: float,
-    walks: Walks,
-    start: Sequence[AxisMotion] | None,
-    known: _Known,
-) -> tuple[AxisMotion, ...]:
-    """Motion along E, N, U; no quieter than bedrock. What is `known` is not fitted again."""
-    fits = []
-    for axis in range(3):
-        guess = None if start is None else start[axis]
-        asked = axis, guess, residual[:, axis].tobytes()
-        if asked not in known:
-            known[asked] = fit_motion(residual[:, axis], interval, walks, guess, MOST_OSCILLATORS[axis])
-        fits.append(known[asked])
-    return _no_quieter(fits)
 
 
 def _no_quieter(motion: Iterable[AxisMotion]) -> tuple[AxisMotion, ...]:

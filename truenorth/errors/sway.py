@@ -192,7 +192,9 @@ def motion_first(states: int, axis: int) -> int:
     return states - sum(AXIS_STATES[axis:])
 
 
-def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMotion]) -> LinearSystem:
+def with_motion(
+    system: LinearSystem, interval: float, motion: Sequence[AxisMotion], *, spare: bool = True
+) -> LinearSystem:
     """The system with the motion of its base as states.
 
     Parameters
@@ -202,17 +204,20 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     interval : float, s
     motion : three AxisMotion
         Along E, N, U; none quieter than that.
+    spare : bool
+        Whether states that no oscillator uses, which stay zero, are among them: as many of each axis as it may use. Without them a
+        likelihood takes less time, to the same bits.
 
     Returns
     -------
     LinearSystem
-        Of 24 more states.
+        Of 24 more states; without spare ones of as many as the oscillators have.
     """
-    states = system.states + sum(AXIS_STATES)
-    bigger = grown(system, states)
+    sizes = AXIS_STATES if spare else tuple(item.states for item in motion)
+    bigger = grown(system, system.states + sum(sizes))
     white = np.zeros(3)
     for axis, item in enumerate(motion):
-        first = motion_first(states, axis)
+        first = system.states + sum(sizes[:axis])
         part = slice(first, first + item.states)
         Phi, Q, P, h = item.blocks(interval)
         bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q
