@@ -204,9 +204,26 @@ def sway_align(
     axes : ImuSpec, optional
         Whose scale factors and misalignments are states where the log is asked whether it fits another place.
     """
+    return swinging(usual_sway(start, mount, turned, axes), start, mount, turned)
+
+
+def usual_sway(start: CoarseStart, mount: Mount, turned: ImuSpec | None, axes: ImuSpec | None = None) -> SwayAlignment:
+    """The same of a base that no lines hold; parameters as in :func:`sway_align`."""
     log, estimator = _with_motion(start, mount, turned)
-    model, position, misfit = start.model, start.position, partial(misfit_at, start, mount, turned or axes)
-    plain = _filtered(log, estimator, misfit)
+    return _filtered(log, estimator, partial(misfit_at, start, mount, turned or axes))
+
+
+def swinging(plain: SwayAlignment, start: CoarseStart, mount: Mount, turned: ImuSpec | None) -> SwayAlignment:
+    """The alignment of a base that swings on lines, where the log shows that it does; else the one that was found without.
+
+    Parameters
+    ----------
+    plain : SwayAlignment
+        Of :func:`usual_sway`.
+    start, mount, turned
+        That it was made of.
+    """
+    log, position = plain.about, start.position
     if not may_swing(plain, plain.motion, position, plain.suspect):
         return plain
     prior = _prior(start, mount, turned, ARM)
@@ -214,7 +231,7 @@ def sway_align(
         log.record,
         log.C_n0_i,
         position,
-        model,
+        start.model,
         prior,
         log.interval,
         start.rows_at,
@@ -223,9 +240,9 @@ def sway_align(
         C_sb=mount.C_sb,
         taken=np.append(log.taken, np.zeros(len(prior.mean) - len(log.taken))),
     )
-    swung = _filtered(on_lines, _SwingFilter(estimator, prior.groups["slow arm"]), misfit)
-    swinging = swings(swung, swung.motion, plain, lambda: plain.begun, position) and not swung.suspect()
-    return swung if swinging else plain
+    swung = _filtered(on_lines, _SwingFilter(plain.estimator, prior.groups["slow arm"]), plain.misfit_at)
+    believed = swings(swung, swung.motion, plain, lambda: plain.begun, position) and not swung.suspect()
+    return swung if believed else plain
 
 
 def misfit_at(start: CoarseStart, mount: Mount, turned: ImuSpec | None, position: Position) -> float:
