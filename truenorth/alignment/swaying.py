@@ -207,7 +207,9 @@ def sway_align(
     return swinging(usual_sway(start, mount, turned, axes), start, mount, turned)
 
 
-def usual_sway(start: CoarseStart, mount: Mount, turned: ImuSpec | None, axes: ImuSpec | None = None) -> SwayAlignment:
+def usual_sway(
+    start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None, axes: ImuSpec | None = None
+) -> SwayAlignment:
     """The same of a base that no lines hold; parameters as in :func:`sway_align`."""
     log, estimator = _with_motion(start, mount, turned)
     return _filtered(log, estimator, partial(misfit_at, start, mount, turned or axes))
