@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 # strongest motion is enough there. Level, a ship may also swing on her lines, by one oscillator of the first order.
 MOST_OSCILLATORS = (2, 2, 1)
 AXIS_STATES = (10, 10, 4)
+SMALL = 16  # states of a compiled filter that is there, too, where the motion has few
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half a period: exact to rounding
 
@@ -205,15 +206,17 @@ def with_motion(
     motion : three AxisMotion
         Along E, N, U; none quieter than that.
     spare : bool
-        Whether states that no oscillator uses, which stay zero, are among them: as many of each axis as it may use. Without them a
-        likelihood takes less time, to the same bits.
+        Whether each axis has as many states as it may use, those that no oscillator uses zero. Without them, where `SMALL` states
+        are enough, a likelihood takes an eighth of the time, to the same bits.
 
     Returns
     -------
     LinearSystem
-        Of 24 more states; without spare ones of as many as the oscillators have.
+        Of 24 more states, or of as many as are used.
     """
-    sizes = AXIS_STATES if spare else tuple(item.states for item in motion)
+    used = tuple(item.states for item in motion)
+    small = not spare and system.states + sum(used) <= SMALL
+    sizes = used if small else AXIS_STATES
     bigger = grown(system, system.states + sum(sizes))
     white = np.zeros(3)
     for axis, item in enumerate(motion):
