@@ -159,12 +159,16 @@ class Fitted:
 
 @pytest.mark.parametrize(("ratio", "unsure"), [(166.0, 0.0), (3.0, 2.0)])
 def test_of_fits_from_headings_all_round_the_likeliest_counts(monkeypatch, ratio, unsure):
-    """Where another is as likely, its heading is in sigma; gyros that see the earth turn fit once."""
+    """Where another is as likely, its heading is in sigma; the likeliest is asked for a swing; good gyros fit once."""
     ends = iter([Fitted(1.0, 50.0 - 0.5 * ratio), Fitted(-1.0, 50.0), *4 * [Fitted(1.0, 50.0 - 0.5 * ratio)]])
+    asked = []
+    monkeypatch.setattr(rotary, "usual_sway", lambda start, mount, turned: next(ends))
+    monkeypatch.setattr(rotary, "swinging", lambda fine, *made_of: asked.append(fine) or fine)
     monkeypatch.setattr(rotary, "sway_align", lambda start, mount, turned: next(ends))
     start = CoarseStart(None, np.eye(3), None, None, None, 0.1, None)
     found, off = rotary._from_headings(start, None, tn.imu_spec("industrial"), 0.6)
     assert found.heading == -1.0
+    assert asked == [found]
     assert off == pytest.approx(unsure)
     ends = iter([Fitted(1.0, 10.0)])
     found, off = rotary._from_headings(start, None, tn.imu_spec("tactical"), 0.6)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from truenorth.alignment.motion_fit import fit_motion
+from truenorth.alignment.motion_fit import search
 from truenorth.alignment.motion_likelihood import Series, Walks, motion_of, parameters
 from truenorth.alignment.windowed import sequential_fit, windowed_fit
-from truenorth.errors.sway import AxisMotion, Oscillator
+from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, Oscillator
 from truenorth.filters import LinearSystem
 
 WALKS = Walks(1e-5, 1e-7)
@@ -92,7 +92,7 @@ def test_as_likely_as_the_truth(name, count):
     for seed in (0, 1):
         y = drawn(motion, count, seed)
         series = Series(y, 1.0, WALKS)
-        found = fit_motion(y, 1.0, WALKS)
+        found = search(series, MOST_OSCILLATORS[0])
         assert series.score(found) < series.score(motion) + 2.0
         if name == "white":
             assert found.sigma == pytest.approx(np.std(y), rel=4 / math.sqrt(2 * count))

@@ -123,7 +123,7 @@ def test_a_swing_is_believed_where_nothing_else_explains_as_much(change, believe
     plain, fine = _fine(0.0), _fine(0.5 * given["gained"])
     monkeypatch.setattr(swing, "_likeliest", lambda item, position: given["left"] if item is fine else 5.0)
     begun = [Evidence("drift.step", {"ratio": given["rival"]}, "bounded")]
-    assert swing.swings(fine, (moved, moved, SEA), plain, begun, Position(0.7, 0.0, 0.0)) is believed
+    assert swing.swings(fine, (moved, moved, SEA), plain, lambda: begun, Position(0.7, 0.0, 0.0)) is believed
 
 
 def test_two_parameters_that_do_the_same_make_no_singular_matrix():

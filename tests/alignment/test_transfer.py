@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests import recordings
+from tests.runs import few_and_all
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Assumed, Linear, Matching, axes_along, transfer_filter
@@ -139,10 +140,10 @@ def test_an_open_loop_does_not_depend_on_what_it_is_about(flight, ideal):
         np.testing.assert_allclose(first.sigma[k][seen], expected[j], rtol=0.02)
 
 
-def test_sigmas_are_honest(flight, ideal):
-    """NEES of attitude, gyro bias, delay, arm over 12 flights: 120 numbers, false alarms 1 in 1000 on either side."""
+@few_and_all(12)
+def test_sigmas_are_honest(flight, ideal, runs):
+    """NEES of attitude, gyro bias, delay, arm: ten numbers a flight, false alarms 1 in 1000 on either side."""
     total = 0.0
-    runs = 12
     for run in range(runs):
         simulation = simulate(ideal, imu=TACTICAL, seed=5, run=run)
         rng = np.random.default_rng([5, run])

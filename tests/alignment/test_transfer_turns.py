@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_turns import KNOWN, MEAN, UNKNOWN, push_of, spins_at, turns_at
 from truenorth.core.attitude import rotation_vector_from_dcm
@@ -30,10 +31,11 @@ def ship():
     return Disturbed(along, roll_tones=(Tone(np.radians(3.5), 9.0),), pitch_tones=(Tone(np.radians(1.0), 7.0, 0.4),))
 
 
+@few_and_all(2, few=1)
 @pytest.mark.parametrize("matching", ["attitude", "both"])
-def test_gyro_noise_tells_no_delay(ship, matching):
+def test_gyro_noise_tells_no_delay(ship, matching, runs):
     """Before: by attitude and velocity the delay was 40 and 20 ms off, 74 and 36 of its sigmas, on a good status."""
-    for run in range(2):
+    for run in range(runs):
         slave = simulate(ship, imu=CONSUMER, rate=100.0, duration=SPAN, seed=3, run=run).record
         spec = MasterSpec(latency=LATE, lever_arm=ARM, velocity_noise=0.02, attitude_noise=2e-5)
         master = simulate_sensor(ship, spec, duration=SPAN, seed=3, run=run).record

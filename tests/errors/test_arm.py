@@ -13,6 +13,7 @@ from truenorth.errors.arm import arm_rows, slow_arm_rows, with_arm
 from truenorth.errors.staying import BA, BG, DV, PHI, StaticModel
 from truenorth.errors.sway import AxisMotion, Oscillator, with_motion, without_sway
 from truenorth.estimate.staying import Prior
+from truenorth.filters import kalman
 from truenorth.papers.rotary.drawings import modulated
 from truenorth.papers.rotary.model import RotaryLog, earth_axes
 from truenorth.papers.rotary.truth import INDEXER_RATES
@@ -142,6 +143,23 @@ def test_states_of_arm_and_motion(ship):
         (full.R - system.R)[:, [0, 1, 2], [0, 1, 2]], np.square([[1e-3, 2e-3, 3e-3]] * 60) - 1e-12
     )
     assert not full.P0[19:, 19:].any()
+
+
+def test_states_that_no_oscillator_uses_change_no_bit(ship):
+    """Without them a likelihood is the same, and so is what is found of all other states."""
+    C = SHIP.states(np.array(0.0)).C_nb
+    integrals = integrate(ship, 1.0)
+    plain = StaticModel(1e-7, 1e-5).linearise(integrals, C, PLACE.lat, PLACE.alt, np.eye(12), np.zeros(3))
+    system = with_arm(plain, arm_rows(integrals, C, PLACE.lat), np.zeros(3))
+    motion = (AxisMotion(1e-3), AxisMotion(2e-3), AxisMotion(3e-3))
+    full, short = (with_motion(system, 1.0, motion, spare=spare) for spare in (True, False))
+    assert (full.states, short.states) == (39, 15)
+    found, same = kalman(full), kalman(short)
+    assert found.log_likelihood == same.log_likelihood
+    np.testing.assert_array_equal(found.x[-1][:15], same.x[-1])
+    np.testing.assert_array_equal(found.P[-1][:15, :15], same.P[-1])
+    broad = (*motion[:2], AxisMotion(3e-3, (Oscillator(1, 0.2, 0.7, 1e-9),)))
+    assert with_motion(system, 1.0, broad, spare=False).states == 39
 
 
 def test_without_sway_an_indexer_still_turns():

@@ -15,6 +15,7 @@ from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
 import truenorth
+from tests.sources import nodes_of, text_of
 from truenorth.core.language import FOLDER, FRAME, LANGUAGES
 from truenorth.report.words import WHY, WORDS
 from truenorth.state.english import SENTENCES, TITLES
@@ -52,10 +53,9 @@ def messages() -> set[str]:
     for file in sorted(HOME.rglob("*.py")):
         if file.relative_to(HOME).parts[0] in NOT_SPOKEN:
             continue
-        text = file.read_text(encoding="utf-8")
-        if not RAISED.search(text):
+        if not RAISED.search(text_of(file)):
             continue
-        nodes = list(ast.walk(ast.parse(text)))
+        nodes = nodes_of(file)
         named: dict[str, list[ast.expr]] = {}
         for node in nodes:
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):

@@ -203,7 +203,20 @@ def _begin_of_waves(change: Array) -> float:
 
 @lru_cache(maxsize=4)
 def slepian(count: int, frequency: float) -> Array:
-    """(count, n) orthonormal sequences that lie below a frequency, cycles a sample, but for `LEAK` of their squares."""
-    apart = np.arange(count) - np.arange(count)[:, None]
-    inside, sequences = np.linalg.eigh(2.0 * frequency * np.sinc(2.0 * frequency * apart))
-    return np.asarray(sequences[:, inside > 1.0 - LEAK])
+    """(count, n) orthonormal sequences that lie below a frequency, cycles a sample, but for `LEAK` of their squares.
+
+    Each is even or odd about its middle: two matrices of half the size. A middle sample stands once, the others twice.
+    """
+    middle, k = count % 2, np.arange((count + 1) // 2)
+    times = np.full(len(k), math.sqrt(0.5))
+    times[len(k) - middle :] = 0.5
+    near, across = (
+        2.0 * frequency * np.sinc(2.0 * frequency * apart) for apart in (k - k[:, None], count - 1 - k - k[:, None])
+    )
+    found = []
+    for sign in (1.0, -1.0):
+        inside, halves = np.linalg.eigh(2.0 * times * (near + sign * across) * times[:, None])
+        half = np.sqrt(0.5) * halves[:, inside > 1.0 - LEAK]
+        half[len(k) - middle :] *= math.sqrt(2.0)
+        found.append(np.concatenate([half, sign * half[::-1][middle:]]))
+    return np.concatenate(found, axis=1)

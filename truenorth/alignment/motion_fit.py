@@ -17,8 +17,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.motion_likelihood import FINER, LOWEST_BIN, Series, Walks, finer_grids, motion_of, parameters
-from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, Oscillator
+from truenorth.alignment.motion_likelihood import FINER, LOWEST_BIN, Series, finer_grids, motion_of, parameters
+from truenorth.errors.sway import AxisMotion, Oscillator
 
 Array = NDArray[np.float64]
 
@@ -38,18 +38,9 @@ CLOSE = 0.02  # of twice the log-likelihood: nearer than this is the maximum
 FARTHEST = 30.0  # rad: phase over the log by which a search may move a frequency
 
 
-def fit_motion(
-    residual: Array,  # (K,) m/s: mean velocity of the base over each interval, but for a smooth trend
-    interval: float,  # s
-    walks: Walks,
-    start: AxisMotion | None = None,  # a good guess, which competes with what a search from nothing finds
-    most: int = MOST_OSCILLATORS[0],  # oscillators
-    others: Array | None = None,  # (K, p) what is taken out besides the trend
-) -> AxisMotion:
-    """The motion along one axis."""
-    series = Series(residual, interval, walks, others)
-    best = search(series, most)
-    return best if start is None else min(best, climb(series, start, POLISHES), key=series.score)
+def with_guess(series: Series, best: AxisMotion, guess: AxisMotion | None) -> AxisMotion:
+    """The likelier of what a search from nothing has found, and what a good guess leads to."""
+    return best if guess is None else min(best, climb(series, guess, POLISHES), key=series.score)
 
 
 def search(series: Series, most: int, start: AxisMotion | None = None) -> AxisMotion:

@@ -33,7 +33,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.sway_inference import sway_inferred
-from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
+from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align, usual_sway
 from truenorth.alignment.swung_bias import swung_biases
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
 from truenorth.alignment.turning import (
@@ -319,9 +319,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
-        about = start._replace(C_n0_i=fine.C_n0_i)
+        about, anew = start._replace(C_n0_i=fine.C_n0_i), usual_sway if fine.slow_arm is None else sway_align
         steps += scale_on_sway_evidence(
-            fine, task.record, lambda record: sway_align(about._replace(record=record), turned=turned, axes=spec)
+            fine, task.record, lambda record: anew(about._replace(record=record), turned=turned, axes=spec)
         )
     way = farthest(fine, task.position) if swung else math.inf
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave)

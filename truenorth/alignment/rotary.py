@@ -29,7 +29,7 @@ from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
-from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align
+from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align, swinging, usual_sway
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
 from truenorth.alignment.turning import infer_turning
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
@@ -181,20 +181,23 @@ def _from_headings(start: CoarseStart, mount: Mount, spec: ImuSpec, lat: float) 
     """The likeliest fine alignment, and how far another one of a like likelihood is off in heading, rad.
 
     Gyros with a bias of the earth's rate show no coarse heading: turned about by the indexer they find it, but from a heading that
-    is too far off a wrong one (likelihood ratio 166, 131 deg). So the fit begins at headings all round.
+    is too far off a wrong one (likelihood ratio 166, 131 deg). So the fit begins at headings all round. Whether the base swings on
+    lines is asked of the likeliest alone: a swing is the base's, from whatever heading it was looked for.
     """
     turned = _turned(spec)
     if math.sqrt(float(spec.bias_variance[:3].max())) < BLIND * EARTH_RATE * math.cos(lat):
         return sway_align(start, mount, turned), 0.0
-    found = [
-        sway_align(start._replace(C_n0_i=dcm_from_rotation_vector([0.0, 0.0, h]) @ start.C_n0_i), mount, turned)
+    starts = [
+        start._replace(C_n0_i=dcm_from_rotation_vector([0.0, 0.0, h]) @ start.C_n0_i)
         for h in np.linspace(0.0, 2.0 * math.pi, HEADINGS, endpoint=False)
     ]
+    found = [usual_sway(each, mount, turned) for each in starts]
     likely = np.array([2.0 * float(fine.estimates.log_likelihood) for fine in found])
     best = int(np.argmax(likely))
     level = [fine.misalignment_at(np.eye(3), 0.0)[0] for fine in found]
     off = [abs(float(misalignment(C, level[best])[2])) for C in level]
-    return found[best], max(x for x, ratio in zip(off, likely[best] - likely, strict=True) if ratio < limit("rival"))
+    unsure = max(x for x, ratio in zip(off, likely[best] - likely, strict=True) if ratio < limit("rival"))
+    return swinging(found[best], starts[best], mount, turned), unsure
 
 
 def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task, *, given: bool) -> list[Evidence]:

@@ -64,7 +64,8 @@ def scale_on_sway_evidence(
     record : ImuRecord
         Of which it is.
     anew : callable
-        Aligns another record about the same attitude, its motion fitted anew.
+        Aligns another record about the same attitude, a motion of the same kind fitted anew: a base that does not swing on lines
+        would else be likelier by its swing, not by its accelerometer.
     """
     if _hardly_sampled(record):
         return []

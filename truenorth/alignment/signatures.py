@@ -13,6 +13,7 @@ from truenorth.alignment.masked import masked_evidence
 from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.sway_noise import sway_noise_evidence
 from truenorth.alignment.swaying import SwayAlignment
+from truenorth.alignment.swing import swing_note
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
@@ -41,5 +42,6 @@ def what_begins(
     elsewhere = None
     if isinstance(fine, SwayAlignment):
         elsewhere = fine.misfit_at
-        steps += [*fine.begun, *(sway_noise_evidence(fine.noisier, spec, position.lat) if given else [])]
+        steps += [*fine.begun, *([] if fine.slow_arm is None else [swing_note(fine.motion)])]
+        steps += sway_noise_evidence(fine.noisier, spec, position.lat) if given else []
     return detect_drift(fine, drift), steps, hemisphere_evidence(gravity, fine, position, elsewhere, given=given)

@@ -60,7 +60,7 @@ def is_slow(item: Oscillator, duration: float) -> bool:
 
 def slow_sway_evidence(
     fine: FineAlignment,
-    system: LinearSystem,
+    full: Callable[[], LinearSystem],
     motion: Sequence[AxisMotion],
     without: Callable[[Array], tuple[float, Array]],
 ) -> list[Evidence]:
@@ -69,10 +69,10 @@ def slow_sway_evidence(
     Parameters
     ----------
     fine : SwayAlignment
-    system : LinearSystem
-        Of its last pass, with all its noise.
+    full : callable
+        Gives the system of its last pass, with all its noise.
     motion : three AxisMotion
-        Along E, N, U; in the last states of `system`.
+        Along E, N, U; in the last states of that system.
     without : callable
         What is left if so much (K, 3) is taken off the measurements, and the motion fitted anew: minus twice the logarithm of the
         likelihood, and the misalignment (3,) at the last epoch.
@@ -80,7 +80,7 @@ def slow_sway_evidence(
     duration = float(fine.integrals.time[-1])
     if not any(is_slow(item, duration) for axis in motion[:2] for item in axis.oscillators):
         return []
-    as_fitted = fine.estimates
+    system, as_fitted = full(), fine.estimates
     lowest = -2.0 * float(as_fitted.log_likelihood)
     found = []
     for share in SMALLER:

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 from truenorth.alignment.fine import CoarseStart
 from truenorth.alignment.sway_noise import is_louder, louder_walks
-from truenorth.alignment.swaying import SwayAlignment, begun, sway_align
+from truenorth.alignment.swaying import SwayAlignment, best_bias, sway_align
 from truenorth.alignment.usual import wandering_as_usual
 from truenorth.errors.staying import StaticModel
 from truenorth.state.limits import limit
@@ -43,7 +43,7 @@ def sway_inferred(
         fine = sway_align(start_of(noise))
     if is_louder(noise, usual):
         quiet = sway_align(start_of(usual))
-        gained = 2.0 * float(quiet.estimates.log_likelihood - fine.estimates.log_likelihood) + begun(quiet)
+        gained = 2.0 * float(quiet.estimates.log_likelihood - fine.estimates.log_likelihood) + best_bias(quiet)
         if gained <= limit("drift"):
             return fine, noise
         fine, noise = quiet, usual
@@ -55,4 +55,4 @@ def sway_inferred(
 
 def _explained(fine: SwayAlignment) -> float:
     """Twice the logarithm of the likelihood of a log, with the best of all that may have begun in it."""
-    return 2.0 * float(fine.estimates.log_likelihood) + begun(fine)
+    return 2.0 * float(fine.estimates.log_likelihood) + best_bias(fine)

@@ -77,7 +77,8 @@ def noisier_sensors(
         other.noise = louder_walks(log.noise, {sensor: factor})
         system = other.linearise()
         both = (motion,) if factor == 1.0 else (motion, steady)
-        return max(2.0 * float(kalman(with_motion(system, interval, m)).log_likelihood) for m in both)
+        systems = (with_motion(system, interval, m, spare=False) for m in both)
+        return max(2.0 * float(kalman(item).log_likelihood) for item in systems)
 
     suspects = [sensor for sensor in SENSORS if seen[sensor] * limit("one noise") >= limit("another sensor")]
     if not suspects:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,11 @@ from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.late_gyros import response_to_late_gyros
 from truenorth.alignment.matched import innovations_of, matched
-from truenorth.alignment.motion_fit import fit_motion
-from truenorth.alignment.motion_likelihood import Walks
+from truenorth.alignment.motion_fit import search, with_guess
+from truenorth.alignment.motion_likelihood import Series, Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
 from truenorth.alignment.sway_noise import noisier_sensors
-from truenorth.alignment.swing import may_swing, swing_note, swings
+from truenorth.alignment.swing import may_swing, swings
 from truenorth.alignment.swing_fit import ARM, fit_swing
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse import oba
@@ -70,15 +70,43 @@ UNKNOWN_ARM = Mount(np.zeros(3), ARM_PRIOR)
 class SwayAlignment(FineAlignment):
     """What the last pass of the filter left; see :class:`FineAlignment`."""
 
-    motion: tuple[AxisMotion, ...]  # along E, N, U
+    about: StayingLog  # as the last pass was linearised
+    estimator: _MotionFilter  # that made it
     arm: Array  # (3,) m
     arm_sigma: Array  # (3,) m
-    late: Array  # (K, 3) what gyros that are late add to the measurements, by the second of their delay
     misfit_at: Callable[[Position], float]  # how badly the log fits another place: :func:`misfit_at`
-    begun: tuple[Evidence, ...] = ()  # that a slow part of the motion may be something that began within the log
-    noisier: Mapping[str, float] = field(default_factory=dict)  # times its specification, by sensor
-    heave: Heave | None = None  # of a base that is one with the IMU
     slow_arm: slice | None = None  # states of the arm of a base that swings on lines; None of another
+
+    # Of several alignments of a log one is the answer: what the others need not know is worked out where it is asked for.
+
+    @property
+    def motion(self) -> tuple[AxisMotion, ...]:
+        """Along E, N, U."""
+        return self.estimator.motion
+
+    @cached_property
+    def begun(self) -> tuple[Evidence, ...]:
+        """That a slow part of the motion may be something that began within the log."""
+        return tuple(slow_sway_evidence(self, self.estimator.full, self.motion, self.estimator.without))
+
+    @cached_property
+    def noisier(self) -> Mapping[str, float]:
+        """Times its specification, by sensor."""
+        return noisier_sensors(self.about, self.motion, self.estimator.interval, partial(best_bias, self))
+
+    @cached_property
+    def late(self) -> Array:
+        """(K, 3) what gyros that are late add to the measurements, by the second of their delay."""
+        return response_to_late_gyros(self.about, self.system.z)
+
+    @cached_property
+    def heave(self) -> Heave | None:
+        """Of a base that is one with the IMU."""
+        return _heave(self.about) if self.about.C_sb is None else None
+
+    def suspect(self) -> bool:
+        """Whether something seems to have begun within the log, or a sensor to be noisier than specified."""
+        return any(item.kind != "hint" for item in self.begun) or bool(self.noisier)
 
 
 @dataclass(frozen=True)
@@ -89,7 +117,28 @@ class _Fitted:
     residual: Array
 
 
-_Known = dict[tuple[int, AxisMotion | None, bytes], AxisMotion]  # motions that were fitted, by axis, guess and velocity
+class _Fits:
+    """Motions fitted to velocities along E, N, U; a velocity that was searched or fitted is not again."""
+
+    def __init__(self, interval: float, walks: Walks) -> None:
+        self.interval, self.walks = interval, walks
+        self.searched: dict[tuple[int, bytes], tuple[Series, AxisMotion]] = {}
+        self.found: dict[tuple[int, bytes, AxisMotion | None], AxisMotion] = {}
+
+    def __call__(self, residual: Array, guesses: Sequence[AxisMotion] | None = None) -> tuple[AxisMotion, ...]:
+        """To a residual (K, 3), from nothing and from guesses; no quieter than bedrock."""
+        return _no_quieter(
+            self._along(axis, residual[:, axis], None if guesses is None else guesses[axis]) for axis in range(3)
+        )
+
+    def _along(self, axis: int, velocity: Array, guess: AxisMotion | None) -> AxisMotion:
+        seen = axis, velocity.tobytes()
+        if seen not in self.searched:
+            series = Series(velocity, self.interval, self.walks)
+            self.searched[seen] = series, search(series, MOST_OSCILLATORS[axis])
+        if (*seen, guess) not in self.found:
+            self.found[*seen, guess] = with_guess(*self.searched[seen], guess)
+        return self.found[*seen, guess]
 
 
 class _MotionFilter:
@@ -97,26 +146,30 @@ class _MotionFilter:
 
     def __init__(self, residual: Array, interval: float, walks: Walks, fits: int = 1) -> None:
         self.interval, self.walks, self.fits, self.passes = interval, walks, fits, 0
-        self.known: _Known = {}
-        self.motion = _fit(residual, interval, walks, None, self.known)
+        self.fit = _Fits(interval, walks)
+        self.motion = self.fit(residual)
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
         # About a good attitude: what was in the first residual besides the motion is gone.
         if 1 < self.passes <= 1 + self.fits:
-            self.motion = _fit(system.z, self.interval, self.walks, self.motion, self.known)
-        return self.filtered(system)
+            self.motion = self.fit(system.z, self.motion)
+        return self.filtered()
 
-    def filtered(self, system: LinearSystem) -> Filtered:
+    def filtered(self) -> Filtered:
         """With the motion as fitted."""
-        full = with_motion(system, self.interval, self.motion)
+        full = self.full()
         return Filtered(full, kalman(full, history="full"))
+
+    def full(self) -> LinearSystem:
+        """The last system, with the motion as fitted."""
+        return with_motion(self.base, self.interval, self.motion)
 
     def without(self, seen: Array) -> tuple[float, Array]:
         """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""
         left = self.base.with_arrays(z=self.base.z - seen)
-        motion = _fit(left.z, self.interval, self.walks, self.motion, self.known)
-        estimates = kalman(with_motion(left, self.interval, motion))
+        motion = self.fit(left.z, self.motion)
+        estimates = kalman(with_motion(left, self.interval, motion, spare=False))
         return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
 
 
@@ -125,7 +178,7 @@ class _SwingFilter(_MotionFilter):
 
     def __init__(self, plain: _MotionFilter, turns: slice) -> None:
         self.interval, self.walks, self.motion, self.turns = plain.interval, plain.walks, plain.motion, turns
-        self.passes, self.known = 0, {}
+        self.passes, self.fit = 0, _Fits(self.interval, self.walks)
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
@@ -133,7 +186,7 @@ class _SwingFilter(_MotionFilter):
             self.motion = _no_quieter(
                 fit_swing(system, self.interval, self.walks, self.motion, system.H[:, :, self.turns])
             )
-        return self.filtered(system)
+        return self.filtered()
 
 
 def sway_align(
@@ -151,18 +204,36 @@ def sway_align(
     axes : ImuSpec, optional
         Whose scale factors and misalignments are states where the log is asked whether it fits another place.
     """
+    return swinging(usual_sway(start, mount, turned, axes), start, mount, turned)
+
+
+def usual_sway(
+    start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None, axes: ImuSpec | None = None
+) -> SwayAlignment:
+    """The same of a base that no lines hold; parameters as in :func:`sway_align`."""
     log, estimator = _with_motion(start, mount, turned)
-    model, position, misfit = start.model, start.position, partial(misfit_at, start, mount, turned or axes)
-    plain = _filtered(log, estimator, misfit)
-    suspect = bool(plain.noisier) or any(item.kind != "hint" for item in plain.begun)
-    if not may_swing(plain, plain.motion, position, suspect=suspect):
+    return _filtered(log, estimator, partial(misfit_at, start, mount, turned or axes))
+
+
+def swinging(plain: SwayAlignment, start: CoarseStart, mount: Mount, turned: ImuSpec | None) -> SwayAlignment:
+    """The alignment of a base that swings on lines, where the log shows that it does; else the one that was found without.
+
+    Parameters
+    ----------
+    plain : SwayAlignment
+        Of :func:`usual_sway`.
+    start, mount, turned
+        That it was made of.
+    """
+    log, position = plain.about, start.position
+    if not may_swing(plain, plain.motion, position, plain.suspect):
         return plain
     prior = _prior(start, mount, turned, ARM)
     on_lines = StayingLog(
         log.record,
         log.C_n0_i,
         position,
-        model,
+        start.model,
         prior,
         log.interval,
         start.rows_at,
@@ -171,11 +242,9 @@ def sway_align(
         C_sb=mount.C_sb,
         taken=np.append(log.taken, np.zeros(len(prior.mean) - len(log.taken))),
     )
-    swung = _filtered(on_lines, _SwingFilter(estimator, prior.groups["slow arm"]), misfit)
-    clean = not swung.noisier and all(item.kind == "hint" for item in swung.begun)
-    if not (clean and swings(swung, swung.motion, plain, plain.begun, position)):
-        return plain
-    return replace(swung, begun=(*swung.begun, swing_note(swung.motion)))
+    swung = _filtered(on_lines, _SwingFilter(plain.estimator, prior.groups["slow arm"]), plain.misfit_at)
+    believed = swings(swung, swung.motion, plain, lambda: plain.begun, position) and not swung.suspect()
+    return swung if believed else plain
 
 
 def misfit_at(start: CoarseStart, mount: Mount, turned: ImuSpec | None, position: Position) -> float:
@@ -202,28 +271,22 @@ def _with_motion(
 
 
 def _filtered(log: StayingLog, estimator: _MotionFilter, misfit: Callable[[Position], float]) -> SwayAlignment:
-    """The log about its last pass, and what may have begun in it."""
+    """The log about its last pass."""
     last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
     position, arm = log.position, log.prior.groups["arm"]
     # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
     seen = own_motion(log.integrals, log.C_n0_i, position.lat, position.alt)
-    fine = SwayAlignment.of(
+    return SwayAlignment.of(
         log,
         last,
         log.prior.sensors,
         np.minimum([item.sigma for item in estimator.motion], seen),
-        motion=estimator.motion,
+        about=log,
+        estimator=estimator,
         arm=log.taken[arm] + last.found.end[arm],
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
-        late=response_to_late_gyros(log, last.found.system.z),
         misfit_at=misfit,
-        heave=_heave(log) if log.C_sb is None else None,
         slow_arm=log.prior.groups.get("slow arm"),
-    )
-    return replace(
-        fine,
-        begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion, estimator.without)),
-        noisier=noisier_sensors(log, estimator.motion, estimator.interval, partial(begun, fine)),
     )
 
 
@@ -234,7 +297,7 @@ def _heave(log: StayingLog) -> Heave:
     return Heave(without_errors(log.record, log.bias, *off), log.C_n0_i, log.position, log.noise.accel_random_walk)
 
 
-def begun(fine: SwayAlignment) -> float:
+def best_bias(fine: SwayAlignment) -> float:
     """Twice the logarithm of the likelihood ratio of the best step or ramp of a bias."""
     return float(matched(innovations_of(fine), bias_signatures(fine))[0].ratio.max())
 
@@ -301,24 +364,6 @@ def _prior(start: CoarseStart, mount: Mount, turned: ImuSpec | None, slow_arm: f
         offset_sigma=mount.offset_sigma,
         slow_arm_sigma=slow_arm,
     )
-
-
-def _fit(
-    residual: Array,
-    interval: float,
-    walks: Walks,
-    start: Sequence[AxisMotion] | None,
-    known: _Known,
-) -> tuple[AxisMotion, ...]:
-    """Motion along E, N, U; no quieter than bedrock. What is `known` is not fitted again."""
-    fits = []
-    for axis in range(3):
-        guess = None if start is None else start[axis]
-        asked = axis, guess, residual[:, axis].tobytes()
-        if asked not in known:
-            known[asked] = fit_motion(residual[:, axis], interval, walks, guess, MOST_OSCILLATORS[axis])
-        fits.append(known[asked])
-    return _no_quieter(fits)
 
 
 def _no_quieter(motion: Iterable[AxisMotion]) -> tuple[AxisMotion, ...]:

@@ -10,7 +10,7 @@ small as that of a ship which her lines hold. Else the answer and the evidence a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from truenorth.alignment.bias_step import bias_signatures
 from truenorth.alignment.drift import drift_signatures
@@ -26,19 +26,24 @@ from truenorth.state.limits import limit, may_be_chance
 PARAMETERS = 6  # frequency and size of two lines, two components of the arm
 
 
-def may_swing(fine: FineAlignment, motion: Sequence[AxisMotion], position: Position, *, suspect: bool) -> bool:
-    """Whether a swing is worth asking for: something looks as if it had begun, of a motion that is suspect or goes slowly."""
+def may_swing(
+    fine: FineAlignment, motion: Sequence[AxisMotion], position: Position, suspect: Callable[[], bool]
+) -> bool:
+    """Whether a swing is worth asking for: something looks as if it had begun, of a motion that is suspect or goes slowly.
+
+    What takes longer to know, whether it is suspect, is asked last.
+    """
     if not long_enough(float(fine.integrals.time[-1])):
         return False
     slow = any(is_swing(item) for axis in motion[:2] for item in axis.oscillators)
-    return suspect or (slow and not may_be_chance(_likeliest(fine, position)))
+    return (slow and not may_be_chance(_likeliest(fine, position))) or suspect()
 
 
 def swings(
     fine: FineAlignment,
     motion: Sequence[AxisMotion],
     plain: FineAlignment,
-    begun: Sequence[Evidence],
+    begun: Callable[[], Sequence[Evidence]],
     position: Position,
 ) -> bool:
     """Whether a base swings on lines.
@@ -51,17 +56,19 @@ def swings(
         The swing's.
     plain : FineAlignment
         With the usual motion.
-    begun : sequence of Evidence
-        What may have begun instead, by a filter with the usual motion.
+    begun : callable
+        Gives evidence of what may have begun instead, by a filter with the usual motion; asked last.
     """
     slow = [[item for item in axis.oscillators if is_swing(item)] for axis in motion[:2]]
     if any(len(items) != 1 or amplitude(items[0]) > MOST for items in slow):
         return False
-    ratios = [float(item.figures["ratio"]) for item in begun]
-    rival = 2.0 * float(plain.estimates.log_likelihood) + max([_likeliest(plain, position), *ratios])
-    gained = 2.0 * float(fine.estimates.log_likelihood) - rival
-    freedom = PARAMETERS * math.log(len(fine.integrals.intervals))
-    return fine.settled and gained - freedom > limit("drift") and may_be_chance(_likeliest(fine, position))
+    if not (fine.settled and may_be_chance(_likeliest(fine, position))):
+        return False
+    gained = 2.0 * float(fine.estimates.log_likelihood - plain.estimates.log_likelihood)
+    needed = limit("drift") + PARAMETERS * math.log(len(fine.integrals.intervals))
+    if gained - _likeliest(plain, position) <= needed:
+        return False
+    return all(gained - float(item.figures["ratio"]) > needed for item in begun())
 
 
 def amplitude(line: Oscillator) -> float:

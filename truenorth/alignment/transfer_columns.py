@@ -158,13 +158,13 @@ class Means:
 
     def __init__(self, slave: ImuRecord, track: Track, carried: Carried, held: Array, arm: Array) -> None:
         steps = interval_lengths(slave)
-        self.slave, self.held, self.arm = slave, held, arm
+        self.slave, self.held = slave, held
         self.knots = np.append(slave.time[0] - steps[0], slave.time)
-        self.C = dcm_from_quaternion(carried.q)  # in the axes of the body at the beginning
-        middle = 0.5 * (self.C[1:] + self.C[:-1])
+        C = dcm_from_quaternion(carried.q)  # in the axes of the body at the beginning
+        middle = 0.5 * (C[1:] + C[:-1])
         velocity = _summed((middle @ _forces(slave, track, steps)[..., None])[..., 0])
         self.turned = _summed(middle * steps[:, None, None])
-        self.moved = _summed(0.5 * (velocity[1:] + velocity[:-1]) * steps[:, None])
+        self.moved = _summed(0.5 * (velocity[1:] + velocity[:-1]) * steps[:, None]) - C @ arm  # of the master
         row = np.clip(np.searchsorted(track.time, held), 0, len(track) - 1)
         lat, alt, v = track.position[row, 0], track.position[row, 2], track.v_n[row]
         self.into_n = carried.C_n0[row]
@@ -176,7 +176,7 @@ class Means:
         # Towards the ends of the log means are shorter.
         span = np.minimum(half, np.minimum(self.held - self.knots[0], self.knots[-1] - self.held))
         span = np.where(span < HALVES[0], np.nan, span)
-        force = self._slope(self.moved, span) - self._slope(self.C, span) @ self.arm
+        force = self._slope(self.moved, span)
         push = (self.into_n @ force[..., None])[..., 0] + self.corrections
         of_arm = self.into_n @ self._slope(self.turned, span) - self.of_earth
         common = self.slave.interval / (INSTANT * span)
@@ -187,17 +187,21 @@ class Means:
         """(M, 3) the master's specific force so long after its rows, n, means; NaN beyond the log."""
         there = self.held + shift
         span = np.where((there - half >= self.knots[0]) & (there + half <= self.knots[-1]), half, np.nan)
-        force = self._slope(self.moved, span, shift) - self._slope(self.C, span, shift) @ self.arm
+        force = self._slope(self.moved, span, shift)
         return np.asarray((self.into_n @ force[..., None])[..., 0])
 
     def _slope(self, whole: Array, span: Array, after: float = 0.0) -> Array:
         """Mean slope, so long after the rows, of what this is the integral of, by a triangle's weights: a second difference."""
         flat, far = whole.reshape(len(whole), -1), np.nan_to_num(span)
-        late, now, early = (
-            np.stack([np.interp(self.held + after + shift, self.knots, column) for column in flat.T], axis=1)
-            for shift in (far, 0.0, -far)
-        )
+        late, now, early = (self._at(self.held + after + shift, flat) for shift in (far, 0.0, -far))
         return np.asarray((late - 2.0 * now + early) / span[:, None] ** 2).reshape(len(span), *whole.shape[1:])
+
+    def _at(self, time: Array, flat: Array) -> Array:
+        """(M, c) columns (N, c) of the knots at times (M,), along straight lines: all columns by one search."""
+        k = np.clip(np.searchsorted(self.knots, time, side="right") - 1, 0, len(self.knots) - 2)
+        behind = np.clip(time, self.knots[0], self.knots[-1]) - self.knots[k]
+        slope = (flat[k + 1] - flat[k]) / (self.knots[k + 1] - self.knots[k])[:, None]
+        return np.asarray(slope * behind[:, None] + flat[k])
 
 
 def _forces(slave: ImuRecord, track: Track, steps: Array) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.blocks import row_blocks
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
+from truenorth.core.remembered import remembered
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
@@ -30,6 +31,7 @@ FEWEST = 30  # differences in a stretch
 TAUS = (0.02, 0.1, 0.5, 1.0, 2.0, 5.0)  # s: of the Allan deviation of a sensor at rest
 
 
+@remembered
 def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
     """Edges (S+1,) of stretches, s, and the density (S, 6) of white noise in them, rad/sqrt(s) and m/s/sqrt(s).
 

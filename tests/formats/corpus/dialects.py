@@ -47,12 +47,16 @@ def table(
         "n": [str(k) for k in range(len(t.time))],
         "e": extra,
     }
+    parts = {
+        key: part.reshape(len(part), -1).tolist() if isinstance(part, np.ndarray) and part.dtype.kind in "fiu" else part
+        for key, part in parts.items()
+    }
     rows = []
     for k in range(len(t.time)):
         cells: list[str] = []
         for key in order:
             part = parts[key][k]
-            cells += [part] if isinstance(part, str) else [fmt % value for value in np.atleast_1d(part)]
+            cells += [part] if isinstance(part, str) else [fmt % value for value in part]
         rows.append(sep.join(cells).replace(".", decimal) if decimal != "." else sep.join(cells))
     head = [above.rstrip("\n")] if above else []
     return end.join([*head, *([header] if header else []), *([below] if below else []), *rows]) + end
