@@ -35,10 +35,9 @@ def white_variance(velocity: Array) -> Array:
 def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, Array]:
     """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too.
 
-    Returns it with the expected variance of the innovations: their mean, each weighted by how large it came out against its own.
-    Where prior and process noise vary from epoch to epoch, ``1 / ratio`` grows with R by one over this mean, and the step is
-    Newton's. A plain mean is that of the first epochs, of a wide prior: steps of its size went from nothing to metres a second
-    and back.
+    Returns it with the expected variance of the innovations: the mean of all epochs, weighted by what each shows of R, one over the
+    square of its variance. A plain mean is that of the first epochs under a wide prior: steps of its size went from nothing to
+    metres a second and back, or nowhere.
     """
     return _variance_of(estimates.innovation, estimates.innovation_covariance, R, colour)
 
@@ -47,9 +46,9 @@ def _variance_of(innovation: Array, covariance: Array, R: Array, colour: bool) -
     """:func:`base_variance` of innovations (K, 3) and their covariances (K, 3, 3)."""
     skip = min(5, len(innovation) // 5)
     count = len(innovation) - skip
-    ratio, weights, low = np.zeros((3, 3))
-    _sums_of(innovation, covariance, skip, COLOUR_BLOCK, ratio, weights, low)
-    mean, ratio = ratio / np.maximum(weights, 1e-300), ratio / count
+    ratio, weighted, weights, low = np.zeros((4, 3))
+    _sums_of(innovation, covariance, skip, COLOUR_BLOCK, ratio, weighted, weights, low)
+    ratio, mean = ratio / count, weighted / weights
     # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
     # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
     blocks = count // COLOUR_BLOCK
@@ -64,15 +63,18 @@ def _variance_of(innovation: Array, covariance: Array, R: Array, colour: bool) -
 
 
 @compiled
-def _sums_of(innovation: Any, covariance: Any, skip: int, length: int, squares: Any, weights: Any, low: Any) -> None:
-    """Of each axis, from row `skip` on: squares of innovations in their variances, these over the variances, squares of sums."""
+def _sums_of(
+    innovation: Any, covariance: Any, skip: int, length: int, squares: Any, weighted: Any, weights: Any, low: Any
+) -> None:
+    """Of each axis, from row `skip` on: squares of innovations in their variances, these weighted, weights, squares of sums."""
     count = len(innovation) - skip
     for i in range(len(squares)):
         whole, total = 0, 0.0
         for k in range(count):
             nu, variance = innovation[skip + k, i], covariance[skip + k, i, i]
             squares[i] += nu * nu / variance
-            weights[i] += nu * nu / variance**2
+            weighted[i] += 1.0 / variance
+            weights[i] += 1.0 / variance**2
             total += nu / np.sqrt(variance)
             whole += 1
             if whole == length:
