@@ -61,3 +61,22 @@ def test_level_of_buoys_is_honest(given: bool) -> None:
     runs = [aligned(vehicles.buoy, "tactical", 300.0, given=given)(1, number) for number in range(12)]
     assert sum(bool(run.refused) for run in runs) <= 1
     assert max(np.max(np.abs(run.ratios["level"])) for run in runs) < 4.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("vehicle", "number"), [(vehicles.buoy, 4), (vehicles.buoy, 13), (vehicles.gondola, 11)])
+def test_passes_that_go_round_leave_the_likeliest_of_them(vehicle, number: int) -> None:
+    """Consumer IMUs of which nothing is said, on bases that swing by tens of degrees: refused as moving with 20 to 584 m/s."""
+    found = aligned(vehicle, "consumer", 300.0, given=False)(1, number)
+    assert not found.refused
+    assert np.max(np.abs(found.ratios["level"])) < 4.0
+
+
+@pytest.mark.slow
+def test_biases_are_as_large_as_the_level_rates_of_a_sway_show() -> None:
+    """Consumer gyros of .28 deg/s: seven times what is usual was taken for their bias, whatever the log showed."""
+    for seed in range(6, 10):
+        record, place, _ = _ship("consumer", seed, 120.0)
+        answer = align(record, place)
+        assert imu_spec("consumer").gyro_bias < answer.imu.gyro_bias < 0.02
+        assert np.max(np.abs(answer.gyro_bias)) < 3.0 * answer.imu.gyro_bias

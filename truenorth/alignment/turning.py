@@ -8,17 +8,18 @@ over twice as many each time, about what the shorter part has shown.
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.check import BLIND_RATE, LogCheck
 from truenorth.alignment.fine import ARM_PRIOR, MAX_NOISE_PASSES, TURN_ARM, FineAlignment
-from truenorth.alignment.inference import GYRO_WIDTH, infer_spec
+from truenorth.alignment.inference import infer_spec
 from truenorth.alignment.swaying import farthest
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.alignment.usual import usual
@@ -27,7 +28,7 @@ from truenorth.core.earth import EARTH_RATE, gravity_of_place
 from truenorth.core.position import Position
 from truenorth.errors.staying import PHI, StaticModel, mean_velocity
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
-from truenorth.estimate.batch import Filtered, in_sigmas, settle
+from truenorth.estimate.batch import CONVERGED, Filtered, Settled, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
 from truenorth.quality.density import noise_densities
@@ -51,18 +52,25 @@ VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
 TURNING = ("still", "disturbed", "rotating")  # bases on which an IMU may be turned
 AT_ENDS = 0.0031  # of g N T^2.5: a thrice integrated white noise less its cubic, at the ends
-ROUND, LAST = 10, 200  # passes over a part, and over the whole: swings of tens of degrees take 40 to 150
+HELD = 0.3  # rad, one sigma: farther a small-angle model is off by more than 1.5 %
+ROUND, LAST = 10, 40  # passes over a part, and over the whole
 
 
 @dataclass(frozen=True)
 class TurningAlignment(FineAlignment):
     """What the last pass left.
 
-    Passes that take long to come to rest may have more than one place for it: level is known no better then than they agree. Those
-    that do not come to rest at all are refused, though the last may move little: of 217 swaying logs one was 4.5 sigmas off.
+    Passes may have more than one place for it: level is known no better than the likely ones agree, and no better than what the
+    likeliest would still move it by. A log is refused where that is more than a sigma.
     """
 
-    scatter: float  # rad^2; of each axis of level, over such passes; zero of others
+    scatter: float  # rad^2; of each axis of level, over the passes
+    held: Array  # (n,): see :class:`_Held`
+
+    @property
+    def end(self) -> Array:
+        """(n,) errors at the last epoch, with the course of the heading held."""
+        return self.held
 
 
 def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
@@ -107,14 +115,26 @@ def rocks_all_along(motion: MotionSummary) -> bool:
 
 
 def infer_turning(task: Task) -> ImuSpec:
-    """Specification of an IMU that turns: by its noise, and by gravity, whose size the accelerometers show at any attitude."""
+    """Specification of an IMU that turns: by its noise, by gravity, whose size shows at any attitude, and by its level rates."""
     noise = turning_noise(task.record)
     size = np.linalg.norm(task.motion.specific_force, axis=1)
-    none = np.zeros(0)
-    check = LogCheck(none, none, float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size)))
-    inferred = infer_spec(check, noise)
-    # With no rate to check, one sigma above the usual: the mean over all that a bias might be has the longest of tails.
-    return with_usual(replace(inferred, gyro_bias=math.exp(GYRO_WIDTH) * usual("gyro", "bias", noise.gyro_random_walk)))
+    force = float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size))
+    return with_usual(infer_spec(LogCheck(*_level_rates(task, noise), *force), noise))
+
+
+def _level_rates(task: Task, noise: StaticModel) -> tuple[Array, Array]:
+    """(2,) mean rates about two level axes, rad/s, and their noise: what a base that ends as level as it began leaves of biases.
+
+    The earth's level rate goes into the noise, and how far the rate about the vertical leans to level: with the axes of the
+    gyros, and with the vertical of biased accelerometers. Tilts, and turns of a tilted base, are in the scatter of the means.
+    """
+    means = task.means
+    up = means.f_b / np.linalg.norm(means.f_b)
+    level = np.linalg.svd(up[None])[2][1:]
+    biased = usual("accel", "bias", noise.accel_random_walk) / task.gravity
+    askew = math.hypot(biased, usual("gyro", "misalignment", noise.gyro_random_walk))
+    others = 0.5 * (EARTH_RATE * math.cos(task.position.lat)) ** 2 + (askew * float(means.w_ib_b @ up)) ** 2
+    return level @ means.w_ib_b, np.sqrt(np.diag(level @ means.w_covariance @ level.T) + others)
 
 
 def sway_walks(record: ImuRecord) -> StaticModel | None:
@@ -181,28 +201,97 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
         )
         R = white_variance(mean_velocity(log.integrals, C, lat, alt))
         everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
-        noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES, grows_after=ROUND)
-        ups: list[Array] = []
-        last = settle(log, partial(_by_level, noise), partial(_moved, log, ups), most=LAST if whole else ROUND)
+        noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
+        passes = _Passes(log, noise)
+        last = settle(log, partial(_by_level, log, noise), passes.moved, most=LAST if whole else ROUND)
+        best = passes.best(at_rest=last.moved < CONVERGED)
+        log, end = best.log, best.found.end
         if whole:
-            scatter = _scatter(np.array(ups)) if last.passes > ROUND else 0.0
-            found = TurningAlignment.of(log, last, prior.sensors, np.sqrt(noise.R[0]), scatter=scatter)
-            return replace(found, settled=last.passes < LAST)  # of so many one may move little by chance
-        log.correct(last.found.end)
+            last = Settled(best.found, last.passes, best.moved)
+            scatter, disturbance = passes.scatter(best), np.sqrt(best.R)
+            found = TurningAlignment.of(log, last, prior.sensors, disturbance, scatter=scatter, held=end)
+            return replace(found, settled=best.moved < limit("bound"))
+        log.correct(end)
         C, taken, length = log.C_n0_i, log.taken, 2.0 * length
 
 
-def _moved(log: StayingLog, ups: list[Array], found: Filtered) -> float:
-    """By how many sigmas a pass has moved level; where it puts the vertical at the end, in the body, goes to `ups`."""
-    end = log.integrals
-    C = earth_rotation(end.time[-1], log.position.lat).T @ log.C_n0_i @ end.C_ib[-1]
-    ups.append((dcm_from_rotation_vector(found.end[PHI]) @ C)[2])
-    return in_sigmas(LEVEL)(found)
+@dataclass(frozen=True)
+class _Held(Filtered):
+    """A pass that hardly moves what it does not see.
+
+    The heading is a convention here, and its course is not known to the bias of the vertical gyro: hundreds of degrees in two
+    minutes. A step of that size is chance, and takes the log out of what is linear. So a pass takes it that the heading at
+    either end turns by nothing, give or take `HELD` (Levenberg's damping, of two directions). Sigmas are without it.
+    """
+
+    held: Array  # (n,)
+
+    @property
+    def end(self) -> Array:
+        """(n,) errors to take off."""
+        return self.held
 
 
-def _scatter(ups: Array) -> float:
-    """Variance of the level of passes (P, 3) about the last, of each axis, rad^2."""
-    return 0.5 * float(np.mean(np.sum((ups - ups[-1]) ** 2, axis=1)))
+class _Pass(NamedTuple):
+    """What a pass found, about which log, and with which variance (3,) of the base's velocity."""
+
+    log: StayingLog
+    found: Filtered
+    R: Array
+    moved: float
+
+    @property
+    def log_likelihood(self) -> float:
+        return float(self.found.estimates.log_likelihood)
+
+    @property
+    def up(self) -> Array:
+        """(3,) the vertical at the end, in the body."""
+        end = self.log.integrals
+        C = earth_rotation(end.time[-1], self.log.position.lat).T @ self.log.C_n0_i @ end.C_ib[-1]
+        return np.asarray((dcm_from_rotation_vector(self.found.end[PHI]) @ C)[2])
+
+
+class _Passes:
+    """The passes over a log: the likeliest of them, and how far they agree on the vertical.
+
+    Biases act by a mean attitude here, which is not how they do act where a base swings by tens of degrees: Gauss and Newton's
+    steps go by a slope that is about right, and passes may go round, or walk away from a good place to a worse one where they
+    rest. A log's likelihood is the same about any nominal solution, as far as the system is linear: the place about which it is
+    larger is the better one.
+    """
+
+    def __init__(self, log: StayingLog, noise: VelocityNoise) -> None:
+        self.log, self.noise = log, noise
+        self.near: _Pass | None = None  # the likeliest of those that moved level by little
+        self.any: _Pass | None = None
+        self.likelihoods: list[float] = []
+        self.ups: list[Array] = []
+
+    def moved(self, found: Filtered) -> float:
+        """By how many sigmas a pass has moved level."""
+        by = in_sigmas(LEVEL)(Filtered(found.system, found.estimates))
+        self.last = _Pass(copy.copy(self.log), found, self.noise.R[0], by)
+        self.likelihoods.append(self.last.log_likelihood)
+        self.ups.append(self.last.up)
+        if by < limit("bound") and (self.near is None or self.last.log_likelihood > self.near.log_likelihood):
+            self.near = self.last
+        if self.any is None or self.last.log_likelihood > self.any.log_likelihood:
+            self.any = self.last
+        return by
+
+    def best(self, *, at_rest: bool) -> _Pass:
+        """The last pass, or one that is likelier than by chance; where passes came to rest, one that moves level little."""
+        likeliest = self.near if at_rest else self.any
+        clearly = likeliest is not None and likeliest.log_likelihood - self.last.log_likelihood > 0.5 * limit("rival")
+        return likeliest if likeliest is not None and clearly else self.last
+
+    def scatter(self, best: _Pass) -> float:
+        """Variance of the level of passes about the best, each as likely as it is, and of what that moves: an axis, rad^2."""
+        weight = np.exp(np.minimum(np.array(self.likelihoods) - best.log_likelihood, 0.0))
+        away = np.sum((np.array(self.ups) - best.up) ** 2, axis=1)
+        left = best.found.end[LEVEL]
+        return 0.5 * float(weight @ away / weight.sum() + left @ left)
 
 
 def strays(fine: FineAlignment, position: Position, walk: float) -> float:
@@ -217,6 +306,10 @@ def strays(fine: FineAlignment, position: Position, walk: float) -> float:
     return farthest(fine, position) - 3.0 * seems
 
 
-def _by_level(noise: VelocityNoise, system: LinearSystem) -> Filtered:
+def _by_level(log: StayingLog, noise: VelocityNoise, system: LinearSystem) -> Filtered:
     """Filtered without the vertical: it carries no attitude, and what tilts of degrees do to it is of second order."""
-    return noise(system.with_arrays(R=system.R + np.diag([0.0, 0.0, VERTICAL**2])))
+    found = noise(system.with_arrays(R=system.R + np.diag([0.0, 0.0, VERTICAL**2])))
+    x, P = found.end, found.P
+    H = np.stack([np.eye(len(x))[PHI.stop - 1], log.at_start()[PHI.stop - 1]])
+    held = x - P @ H.T @ np.linalg.solve(H @ P @ H.T + HELD**2 * np.eye(2), H @ x)
+    return _Held(found.system, found.estimates, held)

@@ -35,7 +35,9 @@ def white_variance(velocity: Array) -> Array:
 def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, Array]:
     """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too.
 
-    Returns it with the mean expected variance of the innovations.
+    Returns it with the expected variance of the innovations: the mean of all epochs, weighted by what each shows of R, one over the
+    square of its variance. A plain mean is that of the first epochs under a wide prior: steps of its size went from nothing to
+    metres a second and back, or nowhere.
     """
     return _variance_of(estimates.innovation, estimates.innovation_covariance, R, colour)
 
@@ -44,9 +46,9 @@ def _variance_of(innovation: Array, covariance: Array, R: Array, colour: bool) -
     """:func:`base_variance` of innovations (K, 3) and their covariances (K, 3, 3)."""
     skip = min(5, len(innovation) // 5)
     count = len(innovation) - skip
-    ratio, mean, low = np.zeros((3, 3))
-    _sums_of(innovation, covariance, skip, COLOUR_BLOCK, ratio, mean, low)
-    ratio, mean = ratio / count, mean / count
+    ratio, weighted, weights, low = np.zeros((4, 3))
+    _sums_of(innovation, covariance, skip, COLOUR_BLOCK, ratio, weighted, weights, low)
+    ratio, mean = ratio / count, weighted / weights
     # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
     # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
     blocks = count // COLOUR_BLOCK
@@ -61,15 +63,18 @@ def _variance_of(innovation: Array, covariance: Array, R: Array, colour: bool) -
 
 
 @compiled
-def _sums_of(innovation: Any, covariance: Any, skip: int, length: int, squares: Any, expected: Any, low: Any) -> None:
-    """Of each axis, from row `skip` on: squares of the innovations in their variances, the variances, squares of sums of blocks."""
+def _sums_of(
+    innovation: Any, covariance: Any, skip: int, length: int, squares: Any, weighted: Any, weights: Any, low: Any
+) -> None:
+    """Of each axis, from row `skip` on: squares of innovations in their variances, these weighted, weights, squares of sums."""
     count = len(innovation) - skip
     for i in range(len(squares)):
         whole, total = 0, 0.0
         for k in range(count):
             nu, variance = innovation[skip + k, i], covariance[skip + k, i, i]
             squares[i] += nu * nu / variance
-            expected[i] += variance
+            weighted[i] += 1.0 / variance
+            weights[i] += 1.0 / variance**2
             total += nu / np.sqrt(variance)
             whole += 1
             if whole == length:
@@ -94,9 +99,6 @@ class VelocityNoise:
         Whether the estimates of every epoch are wanted, or those of the last alone.
     coloured : bool
         Whether the variance covers a base that wanders slowly, too. It is larger then than the likeliest.
-    grows_after : int, optional
-        Passes after which the variance only grows. Whether innovations are coloured is a decision: taken anew in each pass it goes
-        to and fro with the attitude, and neither comes to rest. The larger variance is right for both.
     """
 
     def __init__(
@@ -107,18 +109,14 @@ class VelocityNoise:
         *,
         history: bool = True,
         coloured: bool = True,
-        grows_after: int | None = None,
     ) -> None:
         self.R, self.parts, self.most, self.history = R, parts, most, history
-        self.passes, self.grows_after = 0, grows_after
         self.colours = (False, True) if coloured else (False,)
 
     def __call__(self, quiet: LinearSystem) -> Filtered:
         """Filter a system that holds the variance of the quietest base so far."""
         system = self._with_motion(quiet)
         estimates = self._filtered(system)
-        self.passes += 1
-        grows = self.grows_after is not None and self.passes > self.grows_after
         for colour in self.colours:
             for _ in range(self.most):
                 R, same = self.R.copy(), True
@@ -126,8 +124,7 @@ class VelocityNoise:
                     every = slice(None) if len(self.parts) == 1 and part.all() else part
                     nu, covariance = estimates.innovation[every], estimates.innovation_covariance[every]
                     before = self.R[every][0]
-                    found, expected = _variance_of(nu, covariance, before, colour)
-                    R[every] = np.maximum(found, before) if grows else found
+                    R[every], expected = _variance_of(nu, covariance, before, colour)
                     # The vertical carries no attitude.
                     same &= bool(np.all(np.abs(R[every][0] - before)[:2] < SAME_NOISE * expected[:2]))
                 if same:

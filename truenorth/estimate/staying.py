@@ -226,17 +226,24 @@ class StayingLog:
         A part of them where they turn heading by more than a radian: farther away the system is another one.
         """
         x = x * min(1.0, WIDEST / max(abs(float(x[PHI][2])), 1e-9))
-        # phi(0) = phi(end) + int C_n0_b (eps + M_g w); then everything anew about the estimate.
-        back = x[PHI] + np.einsum("k,kab->ab", self.integrals.intervals, self.C_n0_i @ self.integrals.C_mean) @ x[BG]
-        matrices = self.prior.groups.get("matrices")
-        if matrices is not None:
-            back = back - np.einsum("kij,j->i", self._turns, x[matrices])
-        self.C_n0_i = dcm_from_rotation_vector(back) @ self.C_n0_i
+        back = self.at_start()  # of its own states: those of a base's motion turn nothing
+        self.C_n0_i = dcm_from_rotation_vector(back @ x[: back.shape[1]]) @ self.C_n0_i
         # The level rate is no error of a sensor that could be taken off: it stays, and the attitude is right at the end.
         rate = self.prior.groups.get("rate")
         behind = slice(BIASES.start, len(self.taken) if rate is None else rate.start)
+        self.taken = self.taken.copy()  # a log that was kept stays as it was
         self.taken[behind] += x[behind]
         self.integrals = self._integrated()
+
+    def at_start(self) -> Array:
+        """(3, n) the misalignment at the start by the errors at the last epoch: ``phi(0) = phi + int C_n0_b (eps + M_g w)``."""
+        J = np.zeros((3, len(self.prior.mean)))
+        J[:, PHI] = np.eye(3)
+        J[:, BG] = np.einsum("k,kab->ab", self.integrals.intervals, self.C_n0_i @ self.integrals.C_mean)
+        matrices = self.prior.groups.get("matrices")
+        if matrices is not None:
+            J[:, matrices] = -np.sum(self._turns, axis=0)
+        return J
 
     def _without_errors(self) -> ImuRecord:
         return without_errors(self.record, self.bias, *matrices_of(self.taken[self.prior.groups["matrices"]]))
