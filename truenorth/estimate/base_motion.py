@@ -82,6 +82,22 @@ def _sums_of(
                 whole, total = 0, 0.0
 
 
+class _Bracket:
+    """Variances that were too small and too large: a step that leaves them goes to their geometric middle, and not round."""
+
+    def __init__(self) -> None:
+        self.small, self.large = np.zeros(3), np.full(3, np.inf)
+
+    def within(self, before: Array, asked: Array) -> Array:
+        """Where to go from a variance, (3,) each, of which another one is asked for."""
+        grows = asked > before
+        self.small = np.where(grows, np.maximum(self.small, before), self.small)
+        self.large = np.where(grows, self.large, np.minimum(self.large, before))
+        closed = (self.small > 0.0) & np.isfinite(self.large) & (self.small < self.large)
+        middle = np.sqrt(np.where(closed, self.small * self.large, 1.0))
+        return np.where(closed & ((asked >= self.large) | (asked <= self.small)), middle, asked)
+
+
 class VelocityNoise:
     """An estimator that filters with the variance of the base's velocity that the innovations ask for.
 
@@ -118,13 +134,15 @@ class VelocityNoise:
         system = self._with_motion(quiet)
         estimates = self._filtered(system)
         for colour in self.colours:
+            brackets = [_Bracket() for _ in self.parts]
             for _ in range(self.most):
                 R, same = self.R.copy(), True
-                for part in self.parts:
+                for part, bracket in zip(self.parts, brackets, strict=True):
                     every = slice(None) if len(self.parts) == 1 and part.all() else part
                     nu, covariance = estimates.innovation[every], estimates.innovation_covariance[every]
                     before = self.R[every][0]
-                    R[every], expected = _variance_of(nu, covariance, before, colour)
+                    asked, expected = _variance_of(nu, covariance, before, colour)
+                    R[every] = bracket.within(before, asked)
                     # The vertical carries no attitude.
                     same &= bool(np.all(np.abs(R[every][0] - before)[:2] < SAME_NOISE * expected[:2]))
                 if same:
