@@ -45,7 +45,7 @@ def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
 
 
 def as_long_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
-    """The mounting of a sensor of whose arm nothing was said, its prior as wide as a track has found it long; else the same object."""
+    """The mounting of a sensor of whose arm nothing was said, its prior as wide as a track has found it; or the same object."""
     where = track.layout.slice_of(f"{name} lever arm")
     if where is None or mounting.lever_arm_sigma < VEHICLE_ARM:
         return mounting
