@@ -60,9 +60,9 @@ GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros ar
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 # Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
 PASSES, MORE_PASSES = 2, 6
-# One sigma of heading up to which axes of the gyros may be constants for the filter: with no noise in turns, the products of a
-# larger error with those of tilts, biases and axes pass for knowledge, and level was up to 18 sigmas off
-SURE = math.radians(5.0)
+# One sigma of heading up to which axes of the gyros may be constants for the filter, a quarter of the bank's step: with no noise in
+# turns the products of a larger error with tilts, biases and axes pass for knowledge, and level was up to seven sigmas off.
+SURE = math.radians(7.5)
 LOUD = 3.0  # times its sigma, that an aid is so noisy that the first pass begins anew with what it is
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2
