@@ -43,7 +43,7 @@ def ratios(seed, legs):
     ("legs", "seed"), [(legs, seed) for legs in ("circle", "turns") for seed in (2, 9, 45, 47, 50)]
 )
 def test_a_car_that_circles_knows_level_and_heading_as_it_says(legs, seed):
-    """Level was up to 6.8 sigmas off in circles from the first second on, and 5.4 in those that come after turns; some were refused."""
+    """Level was up to 6.8 sigmas off in circles from the first second on, 5.4 in those after turns; some were refused."""
     off, status = ratios(
         seed, [ROUND] if legs == "circle" else [{"kind": "straight", "duration": "30 s"}, *TURNS, ROUND]
     )
