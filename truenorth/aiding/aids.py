@@ -24,9 +24,8 @@ from truenorth.state.mounting import Mounting
 
 ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
 BASELINE = math.radians(1.0)  # of a second antenna said to be ahead of the first
-VEHICLE_ARM = (
-    5.0  # m, of an antenna of which nothing is said: a metre or two on cars, 10 to 20 m on lorries, aircraft, ships
-)
+# m, of an antenna of which nothing is said: a metre or two on cars, 10 to 20 m on lorries, aircraft, ships
+VEHICLE_ARM = 5.0
 LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
 ANTENNA = Mounting(  # of which nothing is said
     lever_arm_sigma=VEHICLE_ARM, angle_sigma=BASELINE, latency_sigma=LATENCY_SIGMA

@@ -195,7 +195,7 @@ def heading_sigma_back(track: Track) -> float:
 
     From ``phi' = -C (b + M w)`` with what is left of biases b and axes M: ``phi(0) = phi(T) + int C b dt + sum C M dtheta``.
     A scale factor that is known to .5 % is 10 deg after ten circles: the heading at the end, which the vehicle has just shown, is
-    far better than that of the beginning. What the gyros' noise does in between is in neither, and is small beside it.
+    far better than that of the beginning. What the gyros' noise does in between is in neither, and is small against it.
     """
     steps = np.diff(track.time)
     turns = rotation_vector_from_dcm(np.swapaxes(track.C_nb[:-1], 1, 2) @ track.C_nb[1:])
