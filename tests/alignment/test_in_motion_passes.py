@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,15 +10,18 @@ import yaml
 
 from truenorth.aiding.aids import WHEEL, Odometer
 from truenorth.alignment import align, in_motion_passes
-from truenorth.alignment.in_motion_passes import begun, once_more
-from truenorth.alignment.in_motion_start import LEAST_HEADING, Guess, led_back
+from truenorth.alignment.in_motion_passes import begun, once_more, turn_between
+from truenorth.alignment.in_motion_start import LEAST_HEADING, Guess, backtracked, heading_sigma_back, led_back
 from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
+from truenorth.core.earth import EARTH_RATE
 from truenorth.core.position import Position
 from truenorth.navigation.stops import seconds_at_rest
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import scenario as scenario_module
 from truenorth.simulation.scenario import read_scenario
+from truenorth.state.layout import GYRO_AXES, Layout
+from truenorth.state.track import Track
 
 POOR = {
     "name": "constant biases",
@@ -60,6 +64,12 @@ def test_vans_with_poor_gyros_and_wheels_of_pulses():
     assert np.sum(np.square(misses)) < 20.1
 
 
+class AtOnce:
+    """A track of a single epoch: its beginning is its end."""
+
+    time, C_nb, layout = np.zeros(1), np.eye(3)[None], Layout()
+
+
 class LinearLog:
     """A log that says a heading with a sigma, seen by a filter that takes its own sigma for `boast` times as small."""
 
@@ -72,10 +82,11 @@ class LinearLog:
         begun_with = float(euler_from_dcm(guess.C_nb)[0])
         share = guess.heading_sigma**2 / (guess.heading_sigma**2 + self.sigma**2)
 
-        class Passed:
+        class Passed(AtOnce):
             back = dcm_from_euler(begun_with + share * (self.heading - begun_with), 0.0, 0.0)
             gyro_bias = accel_bias = np.zeros((1, 3))
             sigma = np.full((1, 15), np.sqrt(share) * self.sigma / self.boast)
+            P = np.eye(15)[None] * sigma[:, None] ** 2
 
         return Passed
 
@@ -102,17 +113,47 @@ def test_a_pass_hands_on_what_it_has_found():
     sigma = np.concatenate([np.full(9, 1e-3), 0.01 * np.sqrt(spec.bias_variance)])
     sigma[11] = np.sqrt(spec.bias_variance[2])
 
-    class Track:
+    class Found(AtOnce):
         gyro_bias, accel_bias = np.array([[1e-4, 2e-4, 3e-4]]), np.array([[0.01, 0.02, 0.03]])
 
-    Track.sigma = sigma[None]
+    Found.sigma, Found.P = sigma[None], np.diag(sigma**2)[None]
     first = Guess(np.eye(3), 0.07, 0.5)
-    found = led_back(Track, np.eye(3), spec, first)
+    found = led_back(Found, np.eye(3), spec, first)
     assert np.array_equal(found.gyro_bias, [1e-4, 2e-4, 0.0])
     assert np.array_equal(found.accel_bias, [0.01, 0.02, 0.03])
     assert found.heading_sigma == LEAST_HEADING
     assert found.level_sigma == pytest.approx(1e-2)
-    assert led_back(Track, np.eye(3), spec, Guess(np.eye(3), 0.001, 0.01)).heading_sigma == 0.01
+    assert led_back(Found, np.eye(3), spec, Guess(np.eye(3), 0.001, 0.01)).heading_sigma == 0.01
+
+
+def test_the_heading_at_the_beginning_is_as_uncertain_as_the_gyros_that_lead_back_to_it():
+    """Ten circles: by a bias as long as they last, by a scale factor as far as they turn."""
+    time = np.arange(0.0, 361.0)
+    heading = np.radians(10.0 * time)
+    layout = Layout((GYRO_AXES,), ((0.01,) * 9,))
+    sigma = np.concatenate([np.full(3, 0.01), np.zeros(6), np.full(3, 1e-4), np.zeros(3), np.full(9, 0.005)])
+    end = {"time": time, "C_nb": dcm_from_euler(heading, 0.0, 0.0), "layout": layout, "P": np.diag(sigma**2)[None]}
+    turned = 0.005 * heading[-1]  # scale factor about up; misalignments lead back to where they began, and to nothing
+    assert heading_sigma_back(SimpleNamespace(**end)) == pytest.approx(
+        np.sqrt(0.01**2 + 0.036**2 + turned**2), rel=1e-3
+    )
+
+
+def test_a_track_is_led_back_by_gyros_whose_scale_it_has_found():
+    """Gyros that count 1 % too much are ten degrees off after three circles, unless what was found of them is taken off."""
+    time = 0.01 * np.arange(1, 6001)
+    rate = np.array([0.0, 0.0, np.radians(18.0)])
+    record = ImuRecord(time, np.tile(1.01 * rate, (6000, 1)), np.tile([0.0, 0.0, 9.8], (6000, 1)))
+    layout = Layout((GYRO_AXES,), ((0.01,) * 9,))
+    sensors = np.zeros((61, 24))
+    sensors[:, 23] = 0.01
+    at = np.arange(0.0, 61.0)
+    C = dcm_from_euler(-at * rate[2], 0.0, 0.0)
+    found = Track(at, C, np.zeros((61, 3)), np.zeros((61, 3)), sensors, np.zeros((61, 24, 24)), layout, ())
+    off = turn_between(backtracked(record, found), np.eye(3))
+    assert abs(off) < 1.1 * EARTH_RATE * 60.0
+    blind = turn_between(backtracked(record, replace(found, sensors=0.0 * sensors)), np.eye(3))
+    assert abs(blind) == pytest.approx(0.01 * rate[2] * 60.0, rel=0.05)
 
 
 def test_a_creeping_vehicle_does_not_stand():

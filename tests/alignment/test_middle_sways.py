@@ -95,13 +95,17 @@ def test_a_base_that_leaves_is_not_silent(seed):
             assert np.abs(level_off(answer, log.truth.C_nb[-1])).max() < 4.0
 
 
-def test_a_start_on_a_base_that_rocks_has_the_velocity_of_its_rocking():
-    """Of gyros that do not see the earth turn: 1 mm/s was said of an IMU that its arm carries to and fro by decimetres a second."""
+@pytest.mark.parametrize(
+    ("imu", "duration", "runs"),
+    [pytest.param("industrial", 40.0, 8, marks=pytest.mark.slow), ("tactical", 40.0, 3), ("navigation", 80.0, 1)],
+)
+def test_a_start_on_a_base_that_rocks_has_the_velocity_of_its_rocking(imu, duration, runs):
+    """1 mm/s was said of an IMU that its arm carries to and fro by decimetres a second: what the arm explains goes on."""
     ratios = []
-    for seed in range(8):
-        log = swayed(seed, "industrial", size=3.0, arm=3.0)
+    for seed in range(runs):
+        log = swayed(seed, imu, duration=duration, size=3.0, arm=3.0)
         heading = math.atan2(log.truth.C_nb[-1][0, 1], log.truth.C_nb[-1][1, 1])
-        start = known_start(log.record, PLACE, "industrial", heading, math.radians(1.0))
+        start = known_start(log.record, PLACE, imu, heading, math.radians(1.0))
         row = int(np.searchsorted(log.truth.time, start.time - 1e-6))
         ratios.append((start.v_n - log.truth.v_n[row]) / np.sqrt(np.diag(start.P)[3:6]))
     assert np.sqrt(np.mean(np.square(ratios))) < 1.5

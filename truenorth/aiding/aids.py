@@ -24,9 +24,11 @@ from truenorth.state.mounting import Mounting
 
 ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
 BASELINE = math.radians(1.0)  # of a second antenna said to be ahead of the first
+# m, of an antenna of which nothing is said: a metre or two on cars, 10 to 20 m on lorries, aircraft, ships
+VEHICLE_ARM = 5.0
 LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
 ANTENNA = Mounting(  # of which nothing is said
-    lever_arm_sigma=1.0, angle_sigma=BASELINE, latency_sigma=LATENCY_SIGMA
+    lever_arm_sigma=VEHICLE_ARM, angle_sigma=BASELINE, latency_sigma=LATENCY_SIGMA
 )
 WHEEL = Mounting(  # of which nothing is said; a vehicle's bus takes some .01 s
     scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0, latency_sigma=0.05
@@ -78,7 +80,7 @@ class Gnss(_Mounted):
     record : GnssRecord
     mounting : Mounting, optional
         Of the antenna; a second one is on the forward axis of ``C_mb``, to `angle_sigma` (1 deg when left out). Left out, arm
-        (1 m) and latency (.2 s) are estimated.
+        (5 m, and more where the data ask for it) and latency (.2 s) are estimated.
     """
 
     record: GnssRecord

@@ -22,7 +22,8 @@ from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
-from truenorth.alignment.in_motion_passes import Pass, begun, once_more, turn_between
+from truenorth.alignment.in_motion_passes import Pass, begun, once_more
+from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
 from truenorth.alignment.in_motion_verdict import judge_moving
@@ -59,6 +60,9 @@ GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros ar
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 # Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
 PASSES, MORE_PASSES = 2, 6
+# One sigma of heading up to which axes of the gyros may be constants for the filter, a quarter of the bank's step: with no noise in
+# turns the products of a larger error with tilts, biases and axes pass for knowledge, and level was up to seven sigmas off.
+SURE = math.radians(7.5)
 LOUD = 3.0  # times its sigma, that an aid is so noisy that the first pass begins anew with what it is
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2
@@ -193,13 +197,13 @@ def _aligned(
         tell(f"pass {(number := number + 1)}")
         task = slower
         found = once_more(task, found, first)
-    if passes > 1:
+    if passes > 1 and spread.and_more(found.sigma, found.used_twice, found.unsettled).heading < SURE:
         tell(f"pass {(number := number + 1)}")
         task, found = _as_specified(task, found, first)
     if number > 1:
-        spread = math.hypot(spread, found.used_twice, found.unsettled)
+        spread = spread.and_more(found.used_twice, found.unsettled)
     guess, track = found.guess, found.track
-    if method == "motion" and math.hypot(found.sigma, spread) > UNTOLD:
+    if method == "motion" and spread.and_more(found.sigma).heading > UNTOLD:
         task, guess, track = _by_gravity(task, guess, track, first)
     answer = moving_answer(task, task.with_lasting_fixes(track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
@@ -211,15 +215,15 @@ def _aligned(
     return judge_moving(answer, track, heading_limit, more)
 
 
-def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[Pass, float]:
-    """The first pass, and how far guesses lie apart that explain the log as well, rad."""
+def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[Pass, Spread]:
+    """The first pass, and how far guesses lie apart that explain the log as well."""
     tell("coarse alignment")
     if method == "gyrocompass":
         guess = task.by_the_earth()
         # Where the earth's rate is lost in the noise of the aids at first, all headings compete.
         if guess.heading_sigma <= COARSE_HEADING:
             tell("first pass")
-            return begun(task, guess, task.run(guess, gated=False)), 0.0
+            return begun(task, guess, task.run(guess, gated=False)), Spread()
     guesses = guesses_all_round(task.record, task.odometer, task.gnss, task.wheel, task.antenna)
     best, track, spread = _best_of_bank(task, guesses, tell)
     return begun(task, guesses[best], track), spread
@@ -315,7 +319,7 @@ def _published(
             f"{significant(math.degrees(bias) * 3600)} deg/h hide: choose auto or motion, or use better gyros"
         )
     track, acted = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
-    answer = moving_answer(task, track, method, reason(method, acted), 0.0)
+    answer = moving_answer(task, track, method, reason(method, acted), Spread())
     own = _aligned(task, "auto", heading_limit, PASSES, unknown, tell)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     return judge_moving(answer, track, heading_limit, more + against(own, answer))
@@ -346,8 +350,8 @@ def _of_latitude(answer: Alignment, able: bool) -> Evidence:
     return note("latitude.assumed", lat=lat)
 
 
-def _best_of_bank(task: MovingTask, guesses: Sequence[Guess], tell: Callable[[str], None]) -> tuple[int, Track, float]:
-    """Which heading explains the measurements best, its track, and the spread of those that explain them as well, rad."""
+def _best_of_bank(task: MovingTask, guesses: Sequence[Guess], tell: Callable[[str], None]) -> tuple[int, Track, Spread]:
+    """Which heading explains the measurements best, its track, and the spread of those that explain them as well."""
     until = float(task.record.time[0]) + BANK_TIME
     until = until if until < task.record.time[-1] else None  # type: ignore[assignment]
     costs, tracks = [], []
@@ -360,5 +364,4 @@ def _best_of_bank(task: MovingTask, guesses: Sequence[Guess], tell: Callable[[st
     weight = np.exp(-0.5 * (cost - cost.min()))
     weight /= weight.sum()
     best = int(np.argmin(cost))
-    off = [turn_between(track.C_nb[-1], tracks[best].C_nb[-1]) for track in tracks]
-    return best, tracks[best], float(np.sqrt(np.sum(weight * np.square(off))))
+    return best, tracks[best], Spread.of([track.C_nb[-1] for track in tracks], best, weight)

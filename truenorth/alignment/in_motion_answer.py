@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import departures
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.alignment.moving import fifteen, moving_of
@@ -23,8 +24,8 @@ from truenorth.state.limits import is_estimated
 from truenorth.state.track import Track
 
 
-def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread: float) -> Alignment:
-    """The alignment at the end of a track, before any verdict; `spread` (rad): of heading, besides the filter's."""
+def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread: Spread) -> Alignment:
+    """The alignment at the end of a track, before any verdict; `spread`: of heading, besides the filter's."""
     place = track.position[-1]
     sigma = track.sigma[-1]
     try:
@@ -37,8 +38,9 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
             "axes and units, and the specification `imu`"
         ) from None
     history = _history(track, task)
-    covariance = history.phi_covariance[-1].copy()
-    covariance[2, 2] = min(covariance[2, 2] + spread**2, UNIFORM_SIGMA**2)
+    apart = spread.covariance(float(history.phi_covariance[-1][2, 2]))
+    covariance = history.phi_covariance[-1] + apart
+    covariance[2, 2] = min(covariance[2, 2], UNIFORM_SIGMA**2)
     sensor = "odometer" if isinstance(task.odometer, OdometerRecord) else "velocity log"
     mounting = None if task.odometer is None else (sensor, task.wheel.C_mb, task.wheel.lever_arm)
     speed = np.linalg.norm(track.v_n, axis=1)
@@ -56,8 +58,8 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
     if task.gnss is None and not task.more:
         moving = moving.turned(less_sure)
         position = replace(position, horizontal_sigma=float(np.sqrt(np.diag(moving.P)[DP][:2].max())))
-    elif spread:
-        moving = moving.less_sure(less_sure)
+    elif spread.heading > 0.0:
+        moving = moving.off_together(apart)
     moving = replace(moving, delays=delays)
     return Alignment(
         status="not_converged",

@@ -23,7 +23,7 @@ from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
-from truenorth.estimate.latency import as_late_as_found
+from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.sensor_delay import on_springs
 from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_rest
@@ -98,7 +98,7 @@ class MovingTask:
         """The task with what a pass has taught of its sensors, and whether that is much."""
         aiding = self.aiding(gated=False)
         factors = noise_factors(track, aiding, self.factors)
-        antenna = as_late_as_found(self.antenna, track, "GNSS")
+        antenna = mounting_found(self.antenna, track, "GNSS")
         scatter = stamp_scatter(track, aiding, self.scatter)
         much = antenna is not self.antenna or changed(self.factors, factors) or differs(self.scatter, scatter)
         if not much:

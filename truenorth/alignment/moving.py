@@ -92,6 +92,12 @@ class Moving:
         P[PHI, PHI] += np.diag([level, level, heading])
         return replace(self, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
 
+    def off_together(self, phi: Array) -> Moving:
+        """The same state with a covariance (3, 3) of its attitude added, rad^2."""
+        P = self.P.copy()
+        P[PHI, PHI] += phi
+        return replace(self, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + float(phi[2, 2])))
+
     def turned(self, heading: float) -> Moving:
         """The same state, heading less sure by this variance (rad^2), where no sensor shows velocity or place in n.
 

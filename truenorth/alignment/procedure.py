@@ -239,9 +239,16 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     )
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
     way = strays(fine, task.position, used.gyro_random_walk)
-    # The fit takes the arm from the axis, and leaves no motion: the IMU moves on as it did. What is faster than any base is tilt.
+    return _Found(answer, unchecked, fine.settled, way=way, moved=_moves_on(task, fine))
+
+
+def _moves_on(task: Task, fine: FineAlignment) -> Array:
+    """(3,) RMS velocity of the IMU in the last seconds, m/s: what a fitted arm has explained goes on after the log.
+
+    What is faster than any base is tilt.
+    """
     moved = own_motion(fine.integrals, fine.C_n0_i, task.position.lat, task.position.alt, RECENT)
-    return _Found(answer, unchecked, fine.settled, way=way, moved=np.minimum(moved, limit("fastest base")))
+    return np.minimum(moved, limit("fastest base"))
 
 
 def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) -> _Found:
@@ -324,7 +331,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
             fine, task.record, lambda record: anew(about._replace(record=record), turned=turned, axes=spec)
         )
     way = farthest(fine, task.position) if swung else math.inf
-    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave)
+    moved = _moves_on(task, fine) if swung else None
+    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, moved)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:

@@ -1,8 +1,12 @@
-"""How late a sensor is, as a track has found it: what a further pass over the log begins with.
+"""How late a sensor is and how far away, as a track has found it: what a further pass over the log begins with.
 
 A delay acts as its first derivative as long as it is short against manoeuvres, and of a sensor on an arm against the tremble of the
 vehicle: .08 s of an antenna that the road swings at two hertz are a radian of its phase, and look like gyros that are early. So a
 pass ends with the delay that it has found, and the next one begins with it.
+
+At a steady speed ``v`` an arm forward and a delay are one: only ``l - v tau`` is seen. How it is parted, their priors say. Arms of
+which nobody spoke have many sizes, delays have few: where an arm is found beyond its prior, that was too narrow, and the delay has
+taken what it could not hold. The next pass then has a wider arm, and the delay as it was.
 """
 
 from __future__ import annotations
@@ -12,12 +16,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.state.mounting import Mounting
+from truenorth.aiding.aids import VEHICLE_ARM
+from truenorth.state.mounting import LONGEST_ARM, Mounting
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
 LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
+LONG_ARM = 2.0  # sigmas of its prior, from which an arm that nobody has said shows a larger vehicle
 SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word, or a pass
 
 
@@ -36,6 +42,23 @@ def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
     if late is None or abs(late[0]) <= max(LEAST_DELAY, SHOWN_DELAY * late[1]):
         return mounting
     return replace(mounting, latency=mounting.latency + late[0])
+
+
+def as_long_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
+    """The mounting of a sensor of whose arm nothing was said, its prior as wide as a track has found it; or the same object."""
+    where = track.layout.slice_of(f"{name} lever arm")
+    if where is None or mounting.lever_arm_sigma < VEHICLE_ARM:
+        return mounting
+    longest = float(np.abs(track.sensors[-1, where]).max())
+    if longest <= LONG_ARM * mounting.lever_arm_sigma:
+        return mounting
+    return replace(mounting, lever_arm_sigma=min(longest, LONGEST_ARM))
+
+
+def mounting_found(mounting: Mounting, track: Track, name: str) -> Mounting:
+    """The mounting of a sensor with the length or the delay that a track has found; the same object where nothing changes."""
+    longer = as_long_as_found(mounting, track, name)
+    return longer if longer is not mounting else as_late_as_found(mounting, track, name)
 
 
 def counted_from(track: Track, name: str, before: float) -> Track:

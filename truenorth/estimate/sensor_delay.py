@@ -93,11 +93,19 @@ def _likelier(
     for sign in (1, -1):
         for size in LADDER:
             rows = at + sign * max(1, round(size / record.interval))
-            if 2 * abs(rows) >= len(record) or tried(rows) < -limit("ruled out"):
+            if 2 * abs(rows) >= len(record):
+                break
+            # Of a log that contradicts a hundred rows a first small step in the right direction may be no likelier yet.
+            if tried(rows) < -limit("ruled out") and not (rows in tracks and _rejected(tracks[rows]) < _rejected(base)):
                 break
     tried(_peak(ratios, max(ratios, key=ratios.__getitem__)))  # which may stand out where no rung of the ladder does
     best = max(ratios, key=ratios.__getitem__)
     return (best, tracks[best], ratios[best]) if ratios[best] > limit("rival") else None
+
+
+def _rejected(track: Track) -> int:
+    """How many measurements of the aids seem to be outliers."""
+    return sum(r.rejected for r in not_of_gyros(track))
 
 
 def not_of_gyros(track: Track) -> list[Residuals]:

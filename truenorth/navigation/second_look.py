@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.source import Role
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError
-from truenorth.estimate.latency import as_late_as_found
+from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.rivals import moved
 from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.limits import limit
@@ -129,7 +129,7 @@ def as_found(given: dict[str, Any], track: Track) -> dict[str, Any]:
     found = {}
     for key, (name, _) in SENSORS.items():
         mounting = getattr(given.get(key), "mounting", None)
-        if mounting is not None and (later := as_late_as_found(mounting, track, name)) is not mounting:
+        if mounting is not None and (later := mounting_found(mounting, track, name)) is not mounting:
             found[key] = given[key].mounted(later)
     return given | found if found else given
 
