@@ -13,6 +13,7 @@ from benchmarks.honesty import (
     foreign_rows,
     moving,
     navigation,
+    sailing,
     staying,
     transfer,
     turning,
@@ -32,6 +33,7 @@ CASES = (
     *circling.CASES,
     *driving.CASES,
     *foreign_rows.CASES,
+    *sailing.CASES,
 )
 
 if __name__ == "__main__":
