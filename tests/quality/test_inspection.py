@@ -41,6 +41,19 @@ def test_gaps_and_jitter():
     assert found.sampling.jitter_rms == pytest.approx(0.003 * np.sqrt(2.0 / 3.0), rel=0.05)
 
 
+def test_rows_of_a_simulation_at_rest_repeat_by_rounding():
+    """Two fifths of the rows as the row before, the others but for their last digits: no sensor is held."""
+    rng = np.random.default_rng(4)
+    force = np.tile([0.0, 0.0, 9.8], (6000, 1)) * (1.0 + 1e-15 * rng.integers(0, 2, (6000, 1)))
+    rate = np.tile([0.0, 6e-5, 4e-5], (6000, 1)) * (1.0 + 1e-15 * rng.integers(0, 2, (6000, 1)))
+    found = inspect(ImuRecord(0.01 * np.arange(1, 6001), rate, force))
+    assert found.sampling.repeated_rows > 1000
+    assert "repeated_rows" not in codes(found)
+    noise = 1e-5 * np.repeat(rng.standard_normal((3000, 6)), 2, axis=0)
+    held = inspect(ImuRecord(0.01 * np.arange(1, 6001), rate[:1] + noise[:, :3], force[:1] + noise[:, 3:]))
+    assert "repeated_rows" in codes(held, "warning")
+
+
 def test_repeated_rows():
     record = base(duration=30.0)
     rows = np.arange(len(record)) // 2 * 2
