@@ -163,3 +163,13 @@ def test_units_behind_names_that_say_nothing_part_no_columns(tmp_path):
     np.savetxt(tmp_path / "log.csv", imu, delimiter=",", header=head, comments="", fmt="%.9f")
     record = read_imu(tmp_path / "log.csv", rate=100.0, units={"gyro": "rad/s"})
     np.testing.assert_allclose(record.accel, imu[:, 3:], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["fs", "Fs", "sampling_rate"])
+def test_a_rate_of_one_value_with_the_arrays(save, name):
+    """As BROAD keeps it; a rate that the caller gives goes first."""
+    arrays = {"imu_gyr": SENSORS[:, :3], "imu_acc": SENSORS[:, 3:]}
+    record = read_imu(save(**arrays, **{name: 50.0}))
+    assert record.interval == pytest.approx(0.02)
+    assert record.time[0] == pytest.approx(0.02)
+    assert read_imu(save(**arrays, **{name: 50.0}), rate=100.0).interval == pytest.approx(0.01)

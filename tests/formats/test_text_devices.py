@@ -249,3 +249,20 @@ def test_a_line_as_a_phone_wrote_it(tmp_path):
     np.testing.assert_allclose(np.degrees(fix.lat), 28.1435263)
     np.testing.assert_allclose(np.diff(fix.time), 1.0)
     np.testing.assert_allclose(fix.v_n[0, :2], 0.09635656 * np.array([0.9492, -0.3146]), rtol=1e-3)
+
+
+def test_a_header_of_two_lines_whose_cells_span_columns(tmp_path):
+    """As spreadsheets write it, with one separator more than the rows have; without groups the names stay as they are."""
+    path = tmp_path / "log.csv"
+    rng = np.random.default_rng(1)
+    rows = [
+        f"{0.01 * k:.2f};1;0;0;0;{0.1 + 0.01 * rng.standard_normal():.5f};0.2;9.8;{0.01 * rng.standard_normal():.6f};0.003;0.005"
+        for k in range(1, 400)
+    ]
+    head = "Time (s);Optic Orientation;;;;IMU Acceleration;;;IMU Gyroscope;;;\n;W;X;Y;Z;X;Y;Z;X;Y;Z;\n"
+    path.write_text(head + "\n".join(rows) + "\n")
+    record = read_imu(path, units={"gyro": "rad/s"})
+    np.testing.assert_allclose(record.accel[:, 1:], [[0.2, 9.8]] * 399)
+    np.testing.assert_allclose(record.gyro[:, 1:], [[0.003, 0.005]] * 399)
+    path.write_text("a;b\n" + head.replace("X", "x") + "\n".join(rows) + "\n")
+    assert len(read_imu(path, units={"gyro": "rad/s"})) == 399

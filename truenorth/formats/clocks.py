@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from truenorth.records import Guess
 Array = NDArray[np.float64]
 
 INTERVALS = ("ts", "Ts", "dt", "interval")
+FREQUENCIES = ("fs", "Fs", "sampling_rate", "samplingRate", "sample_rate", "sampleRate", "sampling_frequency")
 RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|$)", re.IGNORECASE)
 FEWEST = 50  # rows, from which a log shows by itself what its numbers are
 BUNCHED = 1.2  # mean over median step, from which stamps are of a computer that read several rows at once
@@ -87,7 +88,10 @@ def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> 
             value, name = interval
             rate = 1.0 / (value * unit_factor("time", "rates", layout))
             guesses.append(Guess("rate", f"{rate:g} Hz", f"the interval {name!r}", 1.0, {"rate": rate}))
-    if rate is None:
+    if rate is None and (stated := _one_value(columns, FREQUENCIES)) is not None:
+        rate = stated[0]
+        guesses.append(Guess("rate", f"{rate:g} Hz", f"the rate {stated[1]!r}", 1.0, {"rate": rate}))
+    elif rate is None:
         above = rate_above(columns)
         if above is None:
             raise UsageError(
@@ -151,19 +155,26 @@ def rate_above(columns: Columns) -> tuple[float, str] | None:
     return None
 
 
-def interval_of(columns: Columns, layout: Layout) -> tuple[float, str] | None:
-    """The sampling interval that a variable of one value holds, and its name."""
-    names: Mapping[str, str] = layout.columns
-    candidates = (names["interval"],) if "interval" in names else INTERVALS
+def _one_value(columns: Columns, candidates: Sequence[str]) -> tuple[float, str] | None:
+    """The positive value that a variable of one value holds, and its name."""
     for name in candidates:
         if name in columns.names:
             values = columns.read([name], False)
             if values.size == 1 and 0.0 < values.item() < np.inf:
                 return float(values.item()), name
-            if "interval" in names:
-                raise DataError(
-                    f"{columns.path.name}: interval {name!r} is {values[:3, 0]}; expected one positive time"
-                )
-    if "interval" in names:
-        raise missing_column(columns, "interval", names["interval"])
     return None
+
+
+def interval_of(columns: Columns, layout: Layout) -> tuple[float, str] | None:
+    """The sampling interval that a variable of one value holds, and its name."""
+    names: Mapping[str, str] = layout.columns
+    if "interval" not in names:
+        return _one_value(columns, INTERVALS)
+    name = names["interval"]
+    if name not in columns.names:
+        raise missing_column(columns, "interval", name)
+    found = _one_value(columns, [name])
+    if found is None:
+        values = columns.read([name], False)
+        raise DataError(f"{columns.path.name}: interval {name!r} is {values[:3, 0]}; expected one positive time")
+    return found

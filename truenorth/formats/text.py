@@ -266,6 +266,8 @@ def _header(
             names = Dialect(delimiter, ".").cells(plain)
             if len(names) == count - 1 and not first_cells[-1]:
                 names = [*names, ""]  # a separator at the end of each row
+            if len(names) == count + 1 and not names[-1]:
+                names = names[:-1]  # a separator at the end of the header alone
             if len(names) == count and not all(map(dialect.is_number, names)):
                 break
         else:
@@ -283,8 +285,25 @@ def _header(
         if units is not None:
             names = [f"{name} [{unit}]" if unit.strip("[]()- ") else name for name, unit in zip(names, units)]
             names = [name.replace("[[", "[").replace("]]", "]").replace("[(", "[").replace(")]", "]") for name in names]
+        if k > 0 and (whole := _of_groups(dialect.cells(above[k - 1][1]), names)):
+            return whole, {k, k - 1, unit_line}
         return names, {k, unit_line}
     return [], set()
+
+
+def _of_groups(groups: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Names under the cells of a spreadsheet that span several columns: ``IMU Gyroscope;;`` above ``X;Y;Z``; empty: no such line.
+
+    Only where names alone do not tell the columns apart.
+    """
+    listed = sum(map(bool, groups))
+    if len(set(names)) == len(names) or not 1 < listed < len(names) or len(groups) > len(names) + 1 or not groups[0]:
+        return []
+    whole, group = [], ""
+    for k, name in enumerate(names):
+        group = (groups[k] if k < len(groups) else "") or group
+        whole.append(f"{group} {name}".strip())
+    return whole
 
 
 def _are_units(cells: Sequence[str]) -> bool:
