@@ -21,7 +21,8 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
-from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
+from truenorth.estimate.poorer import poorer_rivals
+from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.given import (
@@ -36,7 +37,7 @@ from truenorth.navigation.given import (
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
-from truenorth.navigation.start import force_at_rest, read_start, start_from_alignment
+from truenorth.navigation.start import force_at_rest, of_poorer, read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
@@ -152,8 +153,13 @@ def navigate(
     taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
     groups = groups_of((*errors, *deflection.groups), noise)
-    model = _model(begin, noise, groups, scale_factors, height)
-    plan = Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output, damping is not None))
+
+    def modelled(spec: ImuSpec) -> InsModel:
+        return _model(begin, spec, groups_of((*errors, *deflection.groups), spec), scale_factors, height)
+
+    plan = Plan(
+        record, begin, modelled(noise), height, disturbances, *_intervals(record, interval, output, damping is not None)
+    )
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
     check_places(given, begin, height)
@@ -167,7 +173,7 @@ def navigate(
     evidence = [*_seen(plan, track, used), *taken, *wanders, *why, *said]
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
-        evidence += _rivals(plan, track, used, noise, smooth)
+        evidence += _rivals(plan, track, used, noise, modelled, smooth)
     else:
         evidence += burst_evidence(record)
     result = Navigation(
@@ -229,8 +235,15 @@ def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
     return evidence
 
 
-def _rivals(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:
-    """What other biases, clocks and mountings explain better."""
+def _rivals(
+    plan: Plan,
+    track: Track,
+    given: Mapping[str, Any],
+    spec: ImuSpec,
+    modelled: Callable[[ImuSpec], InsModel],
+    smooth: bool,
+) -> list[Evidence]:
+    """What other biases, a poorer IMU, other clocks and mountings explain better."""
     aiding = plan.sources(given)
 
     def again(slow: Slow, model: InsModel) -> Track:
@@ -240,11 +253,19 @@ def _rivals(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, s
     def of_record(record: ImuRecord) -> Track:
         return replace(plan, record=record).run(aiding, smooth=smooth)
 
+    def of_another_imu(other: ImuSpec) -> Track:
+        start = of_poorer(plan.start, spec, other)
+        return replace(plan, start=start, model=modelled(other)).run(aiding, smooth=smooth)
+
     usual = partial(again, plan.slow)
     without = [partial(again, less) for less in one_less(plan.slow)]
     found = noise_evidence(usual, track, plan.model, plan.record)
-    warming = partial(warming_rivals, of_record, track, plan.record, spec)
-    found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without, warming)
+
+    def of_another_course() -> list[Rival]:
+        warming = warming_rivals(of_record, track, plan.record, spec)
+        return warming + poorer_rivals(of_another_imu, track, spec)
+
+    found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without, of_another_course)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     found += _led_away(plan, track, given, smooth)
     found += _gyros_of_another_moment(plan, given)
