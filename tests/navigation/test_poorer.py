@@ -63,8 +63,8 @@ def test_a_sound_drive_is_left_alone(runs):
 def test_gyros_that_are_poorer_than_said_in_one_thing_are_found(wrong, key, runs):
     """Contradicted, or in sigma; and what to check is the specification.
 
-    So large that a log shows them: of one of these drives gyros of 1.02 are likelier than those specified by a ratio of 4.9 only, the
-    fault known exactly.
+    So large that a log shows them: on one of these drives 1.02 is likelier than what is specified by a ratio of 4.9 only, the fault
+    known exactly.
     """
     for run in range(runs):
         inputs, truth = BENCH.draw(8721, run)

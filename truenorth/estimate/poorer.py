@@ -50,7 +50,7 @@ def poorer_evidence(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec
     """
     found = [
         rival("rival.poorer", {"factor": factor}, ratio, moved(first, other), "specification")
-        for factor, ratio, other in _climb(run, first, spec, FIELDS, -limit("ruled out"))
+        for factor, ratio, other in _climb(run, first, spec, FIELDS)
     ]
     return sorted(found, key=lambda item: item.effect.level)[-1:]
 
@@ -59,25 +59,26 @@ def poorer_rivals(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec) 
     """Of IMUs poorer in each of the kinds the likeliest, where it fits the measurements better than chance explains.
 
     Of a log that begins with a known attitude, which need not show what the IMU is worth: a poorer one may fit as well. Arguments
-    as of :func:`poorer_evidence`.
+    as of :func:`poorer_evidence`. Of an innovation x the ratio ``x^2 (1/v_0 - 1/v) - ln(v/v_0)`` has one maximum over its variance,
+    and is nothing at v_0, that of the specification: once it falls, still poorer ones are no likelier.
     """
     found = []
     for key, fields in KINDS.items():
-        climbed = list(_climb(run, first, spec, fields, 0.0))
-        factor, ratio, other = max(climbed, key=lambda item: item[1], default=(1.0, 0.0, first))
+        likeliest = (1.0, 0.0, first)
+        for poorer_still in _climb(run, first, spec, fields):
+            if poorer_still[1] < likeliest[1]:
+                break
+            likeliest = poorer_still
+        factor, ratio, other = likeliest
         if ratio > limit("rival"):
             found.append(Rival(ratio, key, {"factor": factor}, effect_of(first, other)))
     return found
 
 
 def _climb(
-    run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec, fields: Sequence[str], least: float
+    run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec, fields: Sequence[str]
 ) -> Iterator[tuple[float, float, Track]]:
-    """How many times as poor, likelihood ratio and track, up to the first whose ratio is less than the least.
-
-    Of an innovation x the ratio ``x^2 (1/v_0 - 1/v) - ln(v/v_0)`` has one maximum over its variance v, and is nothing at that of
-    the specification: once it has fallen below, larger ones are ruled out more.
-    """
+    """How many times as poor, likelihood ratio and track, as long as the log does not rule it out: more is ruled out more."""
     for factor in FACTORS:
         other = poorer(spec, factor, fields)
         if other == spec:  # it has no such errors
@@ -87,6 +88,6 @@ def _climb(
         except DataError:  # the filter broke down: no explanation
             return
         ratio = likelihood_ratio(first.residuals, track.residuals)
-        if ratio < least:
+        if ratio < -limit("ruled out"):
             return
         yield factor, ratio, track
