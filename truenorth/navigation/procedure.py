@@ -51,7 +51,7 @@ from truenorth.quality.slow_aids import Slow, one_less
 from truenorth.records import GnssRecord, ImuRecord, Late
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
-from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
+from truenorth.state.layout import SLOW_ACCEL, SLOW_GYRO
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -152,11 +152,7 @@ def navigate(
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
-    groups = groups_of((*errors, *deflection.groups), noise)
-
-    def modelled(spec: ImuSpec) -> InsModel:
-        return _model(begin, spec, groups_of((*errors, *deflection.groups), spec), scale_factors, height)
-
+    modelled = partial(_model, begin, (*errors, *deflection.groups), scale_factors, height)
     plan = Plan(
         record, begin, modelled(noise), height, disturbances, *_intervals(record, interval, output, damping is not None)
     )
@@ -191,7 +187,7 @@ def navigate(
     if damping is None:
         return judged_navigation(result, counted_once(evidence))
     tell(f"damping: {damping.method}")
-    return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, groups, fixes)
+    return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, fixes)
 
 
 def _damped(
@@ -200,14 +196,13 @@ def _damped(
     reference: VelocityLog | None,
     noise: ImuSpec,
     damping: Damper,
-    groups: tuple[Group, ...],
     fixes: Fixes,
 ) -> Navigation:
     """A free navigation damped, with the error states that go on."""
     from truenorth.damping.navigation import damp_navigation
 
     fine = plan.finest() if reference is not None and plan.every > 1 else None
-    known = [group for group in plan.model.groups if group in groups or group.name in (GYRO_AXES, ACCEL_AXES)]
+    known = [group for group in plan.model.groups if group.name not in (SLOW_GYRO, SLOW_ACCEL)]
     return damp_navigation(result, reference, noise, damping, known, fixes, fine)
 
 
@@ -219,10 +214,10 @@ def _counted_whole(track: Track, asked: Mapping[str, Any]) -> Track:
     return track
 
 
-def _model(begin: Start, noise: ImuSpec, groups: tuple[Group, ...], every_axis: bool, height: Altitude) -> InsModel:
-    """The INS of a specification, with these groups, as it stands at the start."""
-    force, fixed = force_at_rest(begin), height == "fixed"
-    return InsModel.from_spec(noise, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
+def _model(begin: Start, further: Sequence[Group | str], every_axis: bool, height: Altitude, spec: ImuSpec) -> InsModel:
+    """The INS of a specification, with further groups, as it stands at the start."""
+    force, fixed, groups = force_at_rest(begin), height == "fixed", groups_of(further, spec)
+    return InsModel.from_spec(spec, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
 
 
 def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
