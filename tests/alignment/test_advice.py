@@ -11,9 +11,9 @@ from truenorth.advice import advise
 from truenorth.advice.positions import SCHEMES
 from truenorth.alignment import align
 from truenorth.alignment.positions import align_positions
-from truenorth.alignment.suspect import poorer
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
+from truenorth.estimate.poorer import poorer
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
 

@@ -12,7 +12,7 @@ from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_learnt import changed, noise_factors
 from truenorth.alignment.in_motion_task import usual_antenna
-from truenorth.alignment.suspect import poorer
+from truenorth.estimate.poorer import poorer
 from truenorth.records.specs import imu_spec
 from truenorth.state.layout import Layout
 from truenorth.state.track import Residuals, Track

@@ -8,9 +8,10 @@ import pytest
 from benchmarks.honesty.frame import run_case
 from benchmarks.honesty.harness import framed
 from benchmarks.honesty.moving import CASES
-from truenorth.alignment.suspect import FACTORS, name_specification, poorer_evidence
+from truenorth.alignment.suspect import name_specification
 from truenorth.alignment.verdict import bias_evidence, claimed
 from truenorth.campaign.fault_benches import BENCHES
+from truenorth.estimate.poorer import FACTORS, poorer_evidence
 from truenorth.records.specs import imu_spec
 from truenorth.state.layout import Layout
 from truenorth.state.track import Residuals, Track

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.suspect import poorer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, model_from_spec
 from truenorth.alignment.transfer_system import system_of_motion
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.shown import Shown
+from truenorth.estimate.poorer import poorer
 from truenorth.filters import kalman
 from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec

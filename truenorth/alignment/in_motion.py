@@ -29,7 +29,7 @@ from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fi
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.rest_rate import rest_evidence
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.suspect import name_specification, poorer_evidence
+from truenorth.alignment.suspect import name_specification
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
@@ -38,6 +38,7 @@ from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
+from truenorth.estimate.poorer import poorer_evidence
 from truenorth.estimate.rivals import jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import gnss_evidence

@@ -12,48 +12,11 @@ from dataclasses import replace
 
 from truenorth.alignment.result import Alignment
 from truenorth.core.errors import AlignmentError, DataError
-from truenorth.estimate.rivals import likelihood_ratio, moved, rival
+from truenorth.estimate.poorer import FACTORS, poorer
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import Evidence, contradiction
-from truenorth.state.limits import limit
-from truenorth.state.track import Track
+from truenorth.state.evidence import contradiction
 
-FACTORS = (3.0, 10.0, 30.0, 100.0)  # classes of IMUs lie up to a hundred times apart
 CLOCKS = ("second_look.late", "second_look.early", "delay.gyros_")  # evidence of them
-FIELDS = ("bias", "turn_on_bias", "random_walk", "bias_instability", "rate_random_walk", "scale_factor", "misalignment")
-
-
-def poorer(spec: ImuSpec, factor: float) -> ImuSpec:
-    """A specification all of whose errors are so many times as large."""
-    names = [f"{sensor}_{field}" for sensor in ("gyro", "accel") for field in FIELDS]
-    return replace(spec, **{name: factor * getattr(spec, name) for name in names})
-
-
-def poorer_evidence(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec) -> list[Evidence]:
-    """Whether a poorer IMU fits the measurements as well, and by what the answer moves with it.
-
-    Measurements rule it out by far where the specification is right (ratios of -60 and less for a drive of four minutes): errors
-    three times as large would have shown.
-
-    Parameters
-    ----------
-    run : callable
-        The same log with another specification.
-    first : track
-        Of the specification itself.
-    spec : ImuSpec
-    """
-    found = []
-    for factor in FACTORS:
-        try:
-            other = run(poorer(spec, factor))
-        except DataError:  # the filter broke down: no explanation
-            break
-        ratio = likelihood_ratio(first.residuals, other.residuals)
-        if ratio < -limit("ruled out"):
-            break
-        found.append(rival("rival.poorer", {"factor": factor}, ratio, moved(first, other), "specification"))
-    return sorted(found, key=lambda item: item.effect.level)[-1:]
 
 
 def name_specification(answer: Alignment, again: Callable[[ImuSpec], Alignment]) -> Alignment:

@@ -170,7 +170,7 @@ def _climb(
         ratio = likelihood_ratio(first.residuals, other.residuals)
         gained = ratio - max(least, 0.0)
         if gained > limit("rival"):
-            found.append(Rival(gained, f"rival.{sensor}_wanders", {"size": size * sigma}, _effect(first, other)))
+            found.append(Rival(gained, f"rival.{sensor}_wanders", {"size": size * sigma}, effect_of(first, other)))
         elif ratio < before - limit("ruled out"):
             break
         before = max(ratio, before)
@@ -302,7 +302,7 @@ def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
     return after - (wanted - time[after - 1] < time[after] - wanted)
 
 
-def _effect(first: Track, rival: Track) -> Effect:
+def effect_of(first: Track, rival: Track) -> Effect:
     """What the answer moves by, and by what the rival is less sure."""
     more = np.sqrt(np.maximum(rival.sigma[-1, :9] ** 2 - first.sigma[-1, :9] ** 2, 0.0))
     return moved(first, rival).joined(_of_states(more))

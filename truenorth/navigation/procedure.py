@@ -21,7 +21,8 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
-from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
+from truenorth.estimate.poorer import poorer_rivals
+from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.given import (
@@ -36,7 +37,7 @@ from truenorth.navigation.given import (
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
-from truenorth.navigation.start import force_at_rest, read_start, start_from_alignment
+from truenorth.navigation.start import force_at_rest, of_poorer, read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
@@ -50,7 +51,7 @@ from truenorth.quality.slow_aids import Slow, one_less
 from truenorth.records import GnssRecord, ImuRecord, Late
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
-from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
+from truenorth.state.layout import SLOW_ACCEL, SLOW_GYRO
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -151,9 +152,10 @@ def navigate(
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
-    groups = groups_of((*errors, *deflection.groups), noise)
-    model = _model(begin, noise, groups, scale_factors, height)
-    plan = Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output, damping is not None))
+    modelled = partial(_model, begin, (*errors, *deflection.groups), scale_factors, height)
+    plan = Plan(
+        record, begin, modelled(noise), height, disturbances, *_intervals(record, interval, output, damping is not None)
+    )
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
     check_places(given, begin, height)
@@ -167,7 +169,7 @@ def navigate(
     evidence = [*_seen(plan, track, used), *taken, *wanders, *why, *said]
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
-        evidence += _rivals(plan, track, used, noise, smooth)
+        evidence += _rivals(plan, track, used, noise, modelled, smooth)
     else:
         evidence += burst_evidence(record)
     result = Navigation(
@@ -185,7 +187,7 @@ def navigate(
     if damping is None:
         return judged_navigation(result, counted_once(evidence))
     tell(f"damping: {damping.method}")
-    return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, groups, fixes)
+    return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, fixes)
 
 
 def _damped(
@@ -194,14 +196,13 @@ def _damped(
     reference: VelocityLog | None,
     noise: ImuSpec,
     damping: Damper,
-    groups: tuple[Group, ...],
     fixes: Fixes,
 ) -> Navigation:
     """A free navigation damped, with the error states that go on."""
     from truenorth.damping.navigation import damp_navigation
 
     fine = plan.finest() if reference is not None and plan.every > 1 else None
-    known = [group for group in plan.model.groups if group in groups or group.name in (GYRO_AXES, ACCEL_AXES)]
+    known = [group for group in plan.model.groups if group.name not in (SLOW_GYRO, SLOW_ACCEL)]
     return damp_navigation(result, reference, noise, damping, known, fixes, fine)
 
 
@@ -213,10 +214,10 @@ def _counted_whole(track: Track, asked: Mapping[str, Any]) -> Track:
     return track
 
 
-def _model(begin: Start, noise: ImuSpec, groups: tuple[Group, ...], every_axis: bool, height: Altitude) -> InsModel:
-    """The INS of a specification, with these groups, as it stands at the start."""
-    force, fixed = force_at_rest(begin), height == "fixed"
-    return InsModel.from_spec(noise, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
+def _model(begin: Start, further: Sequence[Group | str], every_axis: bool, height: Altitude, spec: ImuSpec) -> InsModel:
+    """The INS of a specification, with further groups, as it stands at the start."""
+    force, fixed, groups = force_at_rest(begin), height == "fixed", groups_of(further, spec)
+    return InsModel.from_spec(spec, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
 
 
 def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
@@ -229,8 +230,15 @@ def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
     return evidence
 
 
-def _rivals(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:
-    """What other biases, clocks and mountings explain better."""
+def _rivals(
+    plan: Plan,
+    track: Track,
+    given: Mapping[str, Any],
+    spec: ImuSpec,
+    modelled: Callable[[ImuSpec], InsModel],
+    smooth: bool,
+) -> list[Evidence]:
+    """What other biases, a poorer IMU, other clocks and mountings explain better."""
     aiding = plan.sources(given)
 
     def again(slow: Slow, model: InsModel) -> Track:
@@ -240,11 +248,19 @@ def _rivals(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, s
     def of_record(record: ImuRecord) -> Track:
         return replace(plan, record=record).run(aiding, smooth=smooth)
 
+    def of_another_imu(other: ImuSpec) -> Track:
+        start = of_poorer(plan.start, spec, other)
+        return replace(plan, start=start, model=modelled(other)).run(aiding, smooth=smooth)
+
     usual = partial(again, plan.slow)
     without = [partial(again, less) for less in one_less(plan.slow)]
     found = noise_evidence(usual, track, plan.model, plan.record)
-    warming = partial(warming_rivals, of_record, track, plan.record, spec)
-    found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without, warming)
+
+    def of_another_course() -> list[Rival]:
+        warming = warming_rivals(of_record, track, plan.record, spec)
+        return warming + poorer_rivals(of_another_imu, track, spec)
+
+    found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without, of_another_course)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     found += _led_away(plan, track, given, smooth)
     found += _gyros_of_another_moment(plan, given)

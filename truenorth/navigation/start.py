@@ -17,10 +17,10 @@ from truenorth.core.errors import AlignmentError, DataError
 from truenorth.core.json_file import read_object
 from truenorth.core.paths import as_path
 from truenorth.core.position import Position
-from truenorth.errors.axes import standing
+from truenorth.errors.axes import axis_sigma, standing
 from truenorth.navigation.handover import Handover
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.state.layout import BA, BG, PHI, STATES
+from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI, STATES
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import WholeBiases, positive, prior_covariance
 from truenorth.state.state import Start
@@ -160,6 +160,21 @@ def moving_start(
 def force_at_rest(start: Start) -> Array:
     """(3,) m/s^2, body axes; on what differs from it the accelerometers' axes act: as the IMU stands, or as they were estimated."""
     return standing() if start.axes else standing(start.C_nb)
+
+
+def of_poorer(start: Start, spec: ImuSpec, other: ImuSpec) -> Start:
+    """The start as another IMU would leave it: attitude, biases and axes known as many times worse, correlated as they are."""
+    biases = _times(spec.bias_variance, other.bias_variance) ** 0.5
+    of_axes = dict(zip((GYRO_AXES, ACCEL_AXES), map(_times, axis_sigma(spec), axis_sigma(other)), strict=True))
+    attitude = np.full(3, biases.max())
+    times = np.concatenate([attitude, np.ones(6), biases, *(of_axes[name] for name in start.axes)])
+    whole = None if start.whole is None else replace(start.whole, constant=biases**2 * start.whole.constant)
+    return replace(start, P=times[:, None] * start.P * times, whole=whole)
+
+
+def _times(known: Array, other: Array) -> Array:
+    """By how many times the other is larger; what is nothing stays so."""
+    return np.where(known > 0.0, other / np.where(known > 0.0, known, 1.0), 1.0)
 
 
 def _with_sensors(start: Start, summary: Mapping[str, Any]) -> Start:

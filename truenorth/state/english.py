@@ -210,6 +210,14 @@ SENTENCES = {
         "an IMU {factor:.0f} times as poor as the specification fits the measurements as well (likelihood ratio {ratio:.3g}); "
         "heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "rival.scale_factors": (
+        "scale factors {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "rival.misalignments": (
+        "misalignments {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
     "delay.gyros_late": (
         "gyros taken {delay:.3f} s earlier fit the measurements better (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at "
         "most): they are late against the accelerometers; heading moves by {heading:angle}, level by {level:angle}"
