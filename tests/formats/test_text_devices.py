@@ -9,6 +9,7 @@ import pytest
 from tests.formats.test_devices import ALT, FRD, LAT, LON, SWAY, TIME, assert_is_sway
 from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_gnss, read_imu, read_master
+from truenorth.formats.guesses import UnsureError
 from truenorth.formats.magnetometer import read_magnetometer
 
 BOOT, UTC = 5321.25, 1.7e9  # s of the phone's clock and of UTC at the truth's zero
@@ -266,3 +267,25 @@ def test_a_header_of_two_lines_whose_cells_span_columns(tmp_path):
     np.testing.assert_allclose(record.gyro[:, 1:], [[0.003, 0.005]] * 399)
     path.write_text("a;b\n" + head.replace("X", "x") + "\n".join(rows) + "\n")
     assert len(read_imu(path, units={"gyro": "rad/s"})) == 399
+
+
+def test_stamps_of_few_digits_ask_for_the_rate(tmp_path):
+    """Five digits, as RepoIMU has them: from 100 s on .01 s, and some repeat. A row that is written twice is another matter."""
+    path = tmp_path / "log.csv"
+    noise = 1e-3 * np.random.default_rng(1).standard_normal((3000, 6)) + np.array([0, 0, 0, 0, 0, 9.8])
+    time = 95.0 + np.arange(3000) / 120.0
+
+    def write(stamps, rows):
+        values = [f"{t},{','.join(f'{x:.6f}' for x in row)}" for t, row in zip(stamps, rows, strict=True)]
+        path.write_text("time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + "\n".join(values) + "\n")
+
+    write([f"{t:.5g}" for t in time], noise)
+    with pytest.raises(UnsureError, match="few digits, so that some repeat; 120 rows a second"):
+        read_imu(path, units={"gyro": "rad/s"})
+    assert read_imu(path, units={"gyro": "rad/s"}, rate=120.0).interval == pytest.approx(1 / 120.0)
+    write(
+        [f"{t:.3f}" for t in np.insert(time, 500, time[500])],
+        np.insert(noise, 500, noise[500], axis=0),
+    )
+    with pytest.raises(DataError, match="drop the repeated rows"):
+        read_imu(path, units={"gyro": "rad/s"})

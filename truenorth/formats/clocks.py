@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -105,13 +106,14 @@ def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> 
 
 
 def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str, guesses: list[Guess]) -> None:
-    """Refuse stamps of a computer that read several rows at once: their steps say nothing of the sampling."""
+    """Refuse stamps of a computer that read several rows at once, or of few digits: their steps say nothing of the sampling."""
     steps = np.diff(raw)
     if len(steps) < FEWEST or steps.min() < 0.0 or raw[-1] <= raw[0]:
         return
     median, mean = float(np.median(steps)), float(np.mean(steps))
     uneven = float(np.mean((steps > 1.5 * median) | (steps == 0.0)))
-    if mean < BUNCHED * median or uneven < BUNCH_SHARE:
+    rounded = steps.min() == 0.0 and _even_but_for_digits(raw, mean)
+    if not rounded and (mean < BUNCHED * median or uneven < BUNCH_SHARE):
         return
     unit = 1.0 if said is not None else size(stated) if stated is not None else None
     if unit is None:
@@ -120,11 +122,27 @@ def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str
     rate = 1.0 / (mean * unit)
     whole = round(rate)
     rate = float(whole) if whole and abs(rate / whole - 1.0) < 0.003 else rate
+    if rounded:
+        raise UnsureError(
+            f"{source}: the stamps have few digits, so that some repeat; {rate:.4g} rows a second come in all; if the sensor "
+            "samples evenly, give its rate", [{"rate": f"{rate:.4g}"}], guesses,
+        )  # fmt: skip
     by_median = "many are equal" if median == 0.0 else f"the median step is one of {1.0 / (median * unit):.0f} Hz"
     raise UnsureError(
         f"{source}: the rows are stamped in bunches: {by_median}, but {rate:.4g} rows a second come in all; if the sensor "
         "samples evenly, give its rate", [{"rate": f"{rate:.4g}"}], guesses,
     )  # fmt: skip
+
+
+def _even_but_for_digits(raw: Array, mean: float) -> bool:
+    """Whether stamps repeat for want of digits: there are no finer ones about them than half an interval, and the pace is one."""
+    spans = raw[10:] - raw[:-10]
+    if float(np.mean(np.abs(spans - 10.0 * mean) <= 1.01 * mean)) < 0.95:
+        return False
+    digits = max(0, math.floor(-math.log10(0.5 * mean)))  # of stamps that are as coarse as that
+    about = (raw[max(k - 10, 0) : k + 11] for k in np.flatnonzero(np.diff(raw) == 0.0))
+    coarse = [np.all(np.abs(stamps - np.round(stamps, digits)) < 1e-9 + 1e-6 * mean) for stamps in about]
+    return float(np.mean(coarse)) > 0.9  # digits may become fewer just there
 
 
 def _evenly(raw: Array, said: str | None, stated: str | None, rate: float, source: str, guesses: list[Guess]) -> Array:
