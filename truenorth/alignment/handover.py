@@ -51,6 +51,8 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         isinstance(fine, SwayAlignment) and fine.slow_arm is not None
     ):  # what is slow in a heading shows itself afterwards only
         kept = np.delete(kept, fine.slow_arm)
+    elif not sways:  # the arm of a sway of less than a minute: rows that follow show it as motion of the base
+        kept = kept[:STATES]
     return Ongoing(
         position=task.position,
         noise=noise,
