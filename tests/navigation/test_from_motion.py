@@ -8,7 +8,7 @@ import pytest
 import truenorth
 from tests.alignment.test_in_motion_level import logs
 from truenorth.core.attitude import misalignment
-from truenorth.state.layout import ACCEL_AXES, GYRO_AXES, PHI, STATES
+from truenorth.state.layout import ACCEL_AXES, ANTENNA_ARM, GYRO_AXES, PHI, STATES
 
 ASKEW = 0.02  # rad, 2.3 sigmas of a consumer IMU: forward force on the upward accelerometer
 
@@ -29,15 +29,15 @@ def askew():
 def test_the_start_is_the_alignments_end(askew, tmp_path):
     """Attitude, scale factors and misalignments: the same covariance, from the answer and from its folder."""
     _, record, gnss, answer = askew
-    assert set(answer.moving.axes) == {GYRO_AXES, ACCEL_AXES}
+    assert set(answer.moving.known) == {GYRO_AXES, ACCEL_AXES, ANTENNA_ARM}
     answer.save(tmp_path)
     own = truenorth.navigate(record, answer, aid=[truenorth.Gnss(gnss)], check_clocks=False).track
     read = truenorth.navigate(record, tmp_path, aid=[truenorth.Gnss(gnss)], check_clocks=False).track
     before = answer.moving.track
-    for name in (GYRO_AXES, ACCEL_AXES):
+    for name in (GYRO_AXES, ACCEL_AXES, ANTENNA_ARM):
         there, here = before.layout.slice_of(name), own.layout.slice_of(name)
         then, now = (
-            P[np.ix_([*range(3), *range(at.start, at.stop)], [*range(3), *range(at.start, at.stop)])]
+            P[np.ix_([*range(9), *range(at.start, at.stop)], [*range(9), *range(at.start, at.stop)])]
             for P, at in ((before.P[-1], there), (own.P[0], here))
         )
         then[:3, :3] = answer.moving.P[:3, :3]  # the bank of headings or the verdict may have added to it
@@ -50,7 +50,7 @@ def test_what_is_forgotten_makes_the_level_too_sure(askew):
     """Of a start without them the level would seem better known by the same pushes, seen twice."""
     motion, record, gnss, answer = askew
     moving = answer.moving
-    bare = replace(answer, moving=replace(moving, P=moving.P[:STATES, :STATES], axes={}))
+    bare = replace(answer, moving=replace(moving, P=moving.P[:STATES, :STATES], known={}))
     kept, lost = (
         truenorth.navigate(record, start, aid=[truenorth.Gnss(gnss)], check_clocks=False).track
         for start in (answer, bare)

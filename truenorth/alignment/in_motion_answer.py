@@ -19,7 +19,7 @@ from truenorth.core.position import Position
 from truenorth.errors.axes import standing
 from truenorth.estimate.latency import delay_of
 from truenorth.records import OdometerRecord
-from truenorth.state.layout import BA, BG, DP, PHI
+from truenorth.state.layout import ACCEL_AXES, ANTENNA_ARM, BA, BG, DP, GYRO_AXES, PHI
 from truenorth.state.limits import is_estimated
 from truenorth.state.track import Track
 
@@ -47,7 +47,8 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
     distance = float(np.trapezoid(speed, track.time))
     prior = np.sqrt(task.spec.bias_variance)
     prior[3:] = np.hypot(prior[3:], np.sqrt(task.spec.acting_variance(standing())))
-    moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting)
+    groups = (GYRO_AXES, ACCEL_AXES) if task.antenna.lever_arm.any() else (GYRO_AXES, ACCEL_AXES, ANTENNA_ARM)
+    moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting, groups)
     delays = {
         name: (sensor.latency + found[0], found[1])
         for name, sensor in (("GNSS", task.antenna), ("odometer", task.wheel), ("velocity log", task.wheel))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +54,7 @@ class Moving:
     ----------
     v_n : (3,) array, m/s
     P : (15 + m, 15 + m) array
-        Covariance of phi, dv, dp, gyro and accelerometer bias (:mod:`truenorth.errors.ins`), and of `axes` behind them.
+        Covariance of phi, dv, dp, gyro and accelerometer bias (:mod:`truenorth.errors.ins`), and of `known` behind them.
     distance : float, m
         Travelled.
     heading_from : str
@@ -67,9 +67,10 @@ class Moving:
         The whole way.
     delays : mapping of sensor to (delay, sigma), s
         By which a sensor's stamps are late, where that was left open and the data show it.
-    axes : mapping of name to (m,) values
-        The IMU's scale factors and misalignments, where they were estimated (:mod:`truenorth.errors.axes`). What pushes an
-        accelerometer that is askew looks like a tilt: both are known together.
+    known : mapping of name to (m,) values
+        The IMU's scale factors and misalignments (:mod:`truenorth.errors.axes`), and an antenna's arm of which nothing was said,
+        where they were estimated. A push on an accelerometer that is askew looks like a tilt, and an arm hides a place: both are
+        known together.
     """
 
     v_n: Array
@@ -82,7 +83,7 @@ class Moving:
     vehicle_heading_sigma: float
     track: Track
     delays: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    axes: Mapping[str, Array] = field(default_factory=dict)
+    known: Mapping[str, Array] = field(default_factory=dict)
 
     def less_sure(self, heading: float, level: float = 0.0, velocity: float = 1.0, position: float = 1.0) -> Moving:
         """The same state with these variances (rad^2) added to heading and level, and sigmas so many times as large."""
@@ -190,12 +191,25 @@ def wheel_of(track: Track, sensor: str, C_mb: Array, lever_arm: Array) -> Wheel:
     )
 
 
-def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[str, Array, Array] | None) -> Moving:
-    """The rest of the state at the end of a track; `mounting` names the odometer or log: ``C_mb`` and lever arm as assumed."""
-    last = track[-1:]
-    found = {name: track.layout.slice_of(name) for name in (GYRO_AXES, ACCEL_AXES)}
-    axes = {name: own for name, own in found.items() if own is not None}
-    P, C_nb = fifteen(last, *axes.values())[0], track.C_nb[-1]
+def moving_of(
+    track: Track,
+    distance: float,
+    heading_from: str,
+    mounting: tuple[str, Array, Array] | None,
+    groups: Sequence[str] = (GYRO_AXES, ACCEL_AXES),
+) -> Moving:
+    """The rest of the state at the end of a track.
+
+    Parameters
+    ----------
+    mounting : (sensor, C_mb, lever arm), optional
+        Of the odometer or log, as assumed.
+    groups : sequence of str
+        Those to be handed on, where the track has them.
+    """
+    found = {name: track.layout.slice_of(name) for name in groups}
+    there = {name: own for name, own in found.items() if own is not None}
+    P, C_nb = fifteen(track[-1:], *there.values())[0], track.C_nb[-1]
     wheel = None if mounting is None else wheel_of(track, *mounting)
     C_mb = np.eye(3) if wheel is None else wheel.C_mb
     forward = C_nb @ C_mb[1]
@@ -217,5 +231,5 @@ def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[
         vehicle_heading=float(np.arctan2(forward[0], forward[1]) % (2.0 * np.pi)),
         vehicle_heading_sigma=float(np.sqrt(variance)),
         track=track,
-        axes={name: track.sensors[-1, own] for name, own in axes.items()},
+        known={name: track.sensors[-1, own] for name, own in there.items()},
     )

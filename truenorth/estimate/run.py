@@ -87,12 +87,12 @@ def begin(
         aux[BG], aux[BA] = start.gyro_bias, start.accel_bias
         P0 = model.prior(start.P)
     else:
-        P0, aux = taken_apart(model, start.P, np.append(start.gyro_bias, start.accel_bias), start.whole, start.axes)
+        P0, aux = taken_apart(model, start.P, np.append(start.gyro_bias, start.accel_bias), start.whole, start.known)
     deflected = model.layout.first_of(DEFLECTION)
     if prior is None and start.plumb > 0.0 and deflected >= 0:
         P0 = at_rest(P0, deflected, start.C_nb, start.lat, start.alt, start.plumb)
     for group in model.groups if prior is None else ():
-        if group.name == ACCEL_AXES and group.name not in start.axes:
+        if group.name == ACCEL_AXES and group.name not in start.known:
             constant = None if start.whole is None else start.whole.constant[3:]
             P0, aux = known_as_bias(P0, aux, group, model.layout.first_of(ACCEL_AXES), constant)
     place = np.array([[start.lat, start.lon, start.alt]])

@@ -33,7 +33,7 @@ from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
-from truenorth.navigation.given import kept_altitude, mountings_found, turns_velocity
+from truenorth.navigation.given import arm_as_begun, kept_altitude, mountings_found, turns_velocity
 from truenorth.navigation.procedure import FINE, PLUMB_LINE, start_of
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.navigation.start import force_at_rest
@@ -104,6 +104,7 @@ class Navigator:
         self.solution = start if isinstance(start, Alignment) else None
         self.feeds = {feed.key: feed for feed in feeds if feed.navigates}
         self._mountings = mountings_found(self.start) | dict(mountings or {})
+        self.start = arm_as_begun(self.start, self._mountings.get(Gnss.key))
         dummies: dict[str, Aid] = {key: feed.aid_of(feed.dummy()) for key, feed in self.feeds.items()}
         self.altitude, self._why = kept_altitude(altitude, dummies)
         self.intake, self.log = Intake(), Log(kind, most_rows)

@@ -13,6 +13,7 @@ from truenorth.aiding.fixes import Fixes
 from truenorth.core.errors import UsageError
 from truenorth.navigation.result import Altitude
 from truenorth.state.evidence import Evidence, note
+from truenorth.state.layout import ANTENNA_ARM
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
@@ -41,6 +42,11 @@ def late_as_found(antenna: Mounting, begin: Start) -> Mounting:
         return antenna
     late, sigma = begin.gnss_delay
     return replace(antenna, latency=late, latency_sigma=sigma)
+
+
+def arm_as_begun(begin: Start, antenna: Mounting | None) -> Start:
+    """The start with what an alignment knows of an antenna's arm, if nothing is said of that here either."""
+    return begin.without(ANTENNA_ARM) if antenna is not None and antenna.lever_arm.any() else begin
 
 
 def mountings_found(begin: Start) -> dict[str, Mounting]:

@@ -26,6 +26,7 @@ from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.given import (
+    arm_as_begun,
     by_key,
     kept_altitude,
     kind_of_log,
@@ -150,6 +151,7 @@ def navigate(
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
+    begin = arm_as_begun(begin, getattr(given.get(Gnss.key), "mounting", None))
     taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
     modelled = partial(_model, begin, (*errors, *deflection.groups), scale_factors, height)

@@ -61,7 +61,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
         )
         if alignment.moving is None:
             return start
-        return _with_sensors(replace(start, axes=alignment.moving.axes), alignment.moving.summary())
+        return _with_sensors(replace(start, known=alignment.moving.known), alignment.moving.summary())
     joint = alignment.handover
     if joint is None:
         joint = _by_static_limits(
@@ -159,7 +159,7 @@ def moving_start(
 
 def force_at_rest(start: Start) -> Array:
     """(3,) m/s^2, body axes; on what differs from it the accelerometers' axes act: as the IMU stands, or as they were estimated."""
-    return standing() if start.axes else standing(start.C_nb)
+    return standing() if ACCEL_AXES in start.known else standing(start.C_nb)
 
 
 def of_poorer(start: Start, spec: ImuSpec, other: ImuSpec) -> Start:
@@ -167,7 +167,9 @@ def of_poorer(start: Start, spec: ImuSpec, other: ImuSpec) -> Start:
     biases = _times(spec.bias_variance, other.bias_variance) ** 0.5
     of_axes = dict(zip((GYRO_AXES, ACCEL_AXES), map(_times, axis_sigma(spec), axis_sigma(other)), strict=True))
     attitude = np.full(3, biases.max())
-    times = np.concatenate([attitude, np.ones(6), biases, *(of_axes[name] for name in start.axes)])
+    times = np.concatenate(
+        [attitude, np.ones(6), biases, *(of_axes.get(name, np.ones(len(x))) for name, x in start.known.items())]
+    )
     whole = None if start.whole is None else replace(start.whole, constant=biases**2 * start.whole.constant)
     return replace(start, P=times[:, None] * start.P * times, whole=whole)
 
@@ -245,8 +247,8 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
             v_n, P = _finite(n["v_n"]), _finite(n["P"])
             biases = numbers["gyro_bias"], numbers["accel_bias"]
             start = moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
-            axes = {str(name): _finite(values) for name, values in n.get("axes", {}).items()}
-            start = _with_sensors(replace(start, axes=axes), s)
+            known = {str(name): _finite(values) for name, values in n.get("known", {}).items()}
+            start = _with_sensors(replace(start, known=known), s)
         else:
             gyro_bias = numbers.pop("gyro_bias")
             if "handover" in n:
@@ -293,5 +295,5 @@ def navigation_block(alignment: Alignment) -> dict[str, Any]:
     if moving is not None:
         block |= {"v_n": moving.v_n.tolist(), "P": moving.P.tolist()}
     if alignment.moving is not None:
-        block["axes"] = {name: values.tolist() for name, values in alignment.moving.axes.items()}
+        block["known"] = {name: values.tolist() for name, values in alignment.moving.known.items()}
     return block

@@ -57,7 +57,7 @@ def check_start(start: Start) -> None:
         )
     variance = np.diag(P)
     scale = np.sqrt(np.outer(np.abs(variance), np.abs(variance)))
-    states = STATES + sum(map(len, start.axes.values()))
+    states = STATES + sum(map(len, start.known.values()))
     if P.shape != (states, states) or np.any(np.abs(P - P.T) > SYMMETRIC * scale.max()):
         raise DataError(
             f"start: the covariance P is not symmetric; expected ({states}, {states}), symmetric: align anew"

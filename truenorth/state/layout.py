@@ -14,6 +14,7 @@ STATES = 15
 
 SLOW_GYRO, SLOW_ACCEL = "slow gyro bias", "slow accelerometer bias"
 GYRO_AXES, ACCEL_AXES = "gyro axes", "accelerometer axes"
+ANTENNA_ARM = "GNSS lever arm"
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.state.layout import STATES
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import WholeBiases
 
@@ -60,8 +61,8 @@ class Start(State):
         By which that alignment found the receiver's stamps to be late.
     plumb : float, rad
         One-sigma deflection of the vertical that P holds as tilt and accelerometer bias that cancel each other; 0: none.
-    axes : mapping of name to (m,) values
-        Groups of the IMU's scale factors and misalignments that an alignment on the move has estimated
+    known : mapping of name to (m,) values
+        Groups that an alignment on the move has estimated, such as the IMU's scale factors and misalignments
         (:mod:`truenorth.errors.axes`): they stand behind the fifteen in P, in this order.
     """
 
@@ -70,7 +71,7 @@ class Start(State):
     wheel: Mounting | None = None
     gnss_delay: tuple[float, float] | None = None
     plumb: float = 0.0
-    axes: Mapping[str, Array] = field(default_factory=dict)
+    known: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, state: State, P: Array) -> Start:
@@ -78,3 +79,12 @@ class Start(State):
         return cls(
             state.time, state.C_nb, state.v_n, state.lat, state.lon, state.alt, state.gyro_bias, state.accel_bias, P
         )
+
+    def without(self, name: str) -> Start:
+        """The start with nothing known of a group; the same where nothing was."""
+        if name not in self.known:
+            return self
+        states = [np.full(STATES, True), *(np.full(len(x), own != name) for own, x in self.known.items())]
+        kept = np.concatenate(states)
+        known = {own: x for own, x in self.known.items() if own != name}
+        return replace(self, P=self.P[np.ix_(kept, kept)], known=known)
