@@ -9,7 +9,8 @@ from tests.navigation.test_navigate import SPEC, drive, fixes
 from truenorth.aiding.aids import Gnss
 from truenorth.navigation import Mounting, navigate
 from truenorth.quality.absolute import accuracy_of, known_as_followed
-from truenorth.state.layout import DP
+from truenorth.state.layout import ANTENNA_ARM, DP, Layout
+from truenorth.state.state import Start, State
 from truenorth.state.track import Residuals, Track
 
 __all__ = ["drive"]  # the fixture of a car that turns twice
@@ -68,4 +69,14 @@ def test_a_loop_that_follows_a_slow_error_knows_place_no_better_than_that(drive,
     found, said = known_as_followed(track, Gnss(record), "gnss")
     assert [item.key for item in said] == (["innovations.wander"] if lasts else [])
     sigma = found.sigma[-1, DP]
+    armed = replace(
+        track, layout=Layout((ANTENNA_ARM,), ((5.0,) * 3,)), P=0.01 * np.eye(18)[None], sensors=np.zeros((1, 18))
+    )
+    start = Start.of(State.at(np.eye(3), 0.8), np.eye(15))
+    more = known_as_followed(armed, Gnss(record), "gnss", start)[0].sigma[-1, DP]
+    np.testing.assert_allclose(more**2 - sigma**2, 25.0 - 0.01 if lasts else 0.0, rtol=1e-6, atol=1e-9)
+    learnt = replace(start, P=np.diag([*np.ones(15), 4.0, 4.0, 9.0]), known={ANTENNA_ARM: np.zeros(3)})
+    assert learnt.without(ANTENNA_ARM).P.shape == (15, 15)
+    more = known_as_followed(armed, Gnss(record), "gnss", learnt)[0].sigma[-1, DP]
+    np.testing.assert_allclose(np.sum(more**2 - sigma**2), 17.0 - 0.03 if lasts else 0.0, rtol=1e-6, atol=1e-9)
     assert sigma[0] == pytest.approx(2.0) if not lasts else np.all((sigma > 4.0) & (sigma < 16.0))

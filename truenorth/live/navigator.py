@@ -377,7 +377,7 @@ class Navigator:
         )
         wanders: list[Evidence] = []
         if isinstance(receiver, Gnss):
-            track, wanders = known_as_followed(track, receiver, self.altitude)
+            track, wanders = known_as_followed(track, receiver, self.altitude, self.start)
         slow = {str(item.figures["name"]) for item in wanders}
         evidence = [*innovation_evidence(track.residuals, last_sigma(track), in_sigma=slow), *wanders, *self._why]
         result = Navigation(

@@ -18,8 +18,9 @@ from truenorth.aiding.sensors import place_axes, place_sigma
 from truenorth.quality.slow_aids import FIXES, Lasting, as_lasting, says_size, slow_errors, usual_bias, with_slow
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import DP
+from truenorth.state.layout import ANTENNA_ARM, DP
 from truenorth.state.limits import limit
+from truenorth.state.state import Start
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -62,11 +63,14 @@ def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None, 
     return replace(track, P=P)
 
 
-def known_as_followed(track: Track, receiver: Gnss, altitude: str) -> tuple[Track, list[Evidence]]:
+def known_as_followed(
+    track: Track, receiver: Gnss, altitude: str, start: Start | None = None
+) -> tuple[Track, list[Evidence]]:
     """The track of a loop that has no states for slow errors of its fixes, and what is to be said of such errors.
 
     The loop follows a slow error. So position is known no better than by a fix (:func:`known_as_fixes`), nor than the slow error
-    that the innovations up to now show. What their colour says of position is in sigma then.
+    that the innovations up to now show. What their colour says of position is in sigma then. And what fixes that wander seem to
+    say of the antenna's arm is as little knowledge: of the place, the arm hides as much as it did at the start.
 
     Parameters
     ----------
@@ -76,8 +80,25 @@ def known_as_followed(track: Track, receiver: Gnss, altitude: str) -> tuple[Trac
         Its newest rows.
     altitude : str
         How height is kept.
+    start : Start, optional
+        Of the loop.
     """
     fixes = [source for source in receiver.sources(altitude) if source.name == FIXES]
     slow, said = slow_errors(track, fixes)
     bias = None if receiver.mounting is None else receiver.mounting.bias_sigma
-    return as_lasting(known_as_fixes(track, receiver.record, bias), with_slow(fixes, slow)), said
+    found = as_lasting(known_as_fixes(track, receiver.record, bias), with_slow(fixes, slow))
+    return (_with_arm_of(found, start) if said and start is not None else found), said
+
+
+def _with_arm_of(track: Track, start: Start) -> Track:
+    """The track with the place as uncertain as if the antenna's arm were known no better than at the start."""
+    own = track.layout.slice_of(ANTENNA_ARM)
+    if own is None or not len(track.P):
+        return track
+    begun = np.square(track.layout.priors[track.layout.names.index(ANTENNA_ARM)])
+    if ANTENNA_ARM in start.known:
+        begun = np.diag(start.P)[start.states_of(ANTENNA_ARM)]
+    now = np.diagonal(track.P, axis1=1, axis2=2)[:, own]
+    P, C = track.P.copy(), track.C_nb * (np.diagonal(track.P, axis1=1, axis2=2)[:, DP] > 0.0)[:, :, None]
+    P[:, DP, DP] += (C * np.maximum(begun - now, 0.0)[:, None, :]) @ np.swapaxes(C, 1, 2)
+    return replace(track, P=P)

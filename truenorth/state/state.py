@@ -80,11 +80,16 @@ class Start(State):
             state.time, state.C_nb, state.v_n, state.lat, state.lon, state.alt, state.gyro_bias, state.accel_bias, P
         )
 
+    def states_of(self, name: str) -> slice:
+        """Where a group that is known stands in P."""
+        before = list(self.known)[: list(self.known).index(name)]
+        first = STATES + sum(len(self.known[own]) for own in before)
+        return slice(first, first + len(self.known[name]))
+
     def without(self, name: str) -> Start:
         """The start with nothing known of a group; the same where nothing was."""
         if name not in self.known:
             return self
-        states = [np.full(STATES, True), *(np.full(len(x), own != name) for own, x in self.known.items())]
-        kept = np.concatenate(states)
+        kept = np.delete(np.arange(len(self.P)), self.states_of(name))
         known = {own: x for own, x in self.known.items() if own != name}
         return replace(self, P=self.P[np.ix_(kept, kept)], known=known)
