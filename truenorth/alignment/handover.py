@@ -46,13 +46,10 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
     """The filter's end, from which it goes on."""
     integrals = fine.integrals
     sways = isinstance(fine, SwayAlignment)
-    kept = np.arange(fine.system.states)
-    if (
-        isinstance(fine, SwayAlignment) and fine.slow_arm is not None
-    ):  # what is slow in a heading shows itself afterwards only
-        kept = np.delete(kept, fine.slow_arm)
-    elif not sways:  # the arm of a sway of less than a minute: rows that follow show it as motion of the base
-        kept = kept[:STATES]
+    # The arm of a sway of less than a minute is left behind: rows that follow show it as motion of the base.
+    kept = np.arange(fine.system.states if sways else STATES)
+    if isinstance(fine, SwayAlignment) and fine.slow_arm is not None:
+        kept = np.delete(kept, fine.slow_arm)  # what is slow in a heading shows itself afterwards only
     return Ongoing(
         position=task.position,
         noise=noise,

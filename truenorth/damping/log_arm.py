@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.course import motion_at
-from truenorth.damping.waves import SPAN
+from truenorth.damping.waves import SPAN, hann_means
 from truenorth.errors.log import DRIFT, LogErrors, log_rows
 from truenorth.records import VelocityRecord
 from truenorth.state.evidence import Evidence, note
@@ -113,8 +113,10 @@ def sought(course: Track, record: VelocityRecord, errors: LogErrors, sigma: floa
         velocity = np.einsum("kij,kj->ki", C_nb, velocity)
     groups = tuple(group for group in errors.groups() if group.name != DRIFT)
     shown = np.concatenate([turning[:, :2, :2], log_rows(groups, C_nb, v_n)], axis=2)
-    off, rows = _means(time, (v_n - velocity)[:, :2]), _means(time, shown)
-    z, H = np.diff(off, 2, axis=0).reshape(-1), np.diff(rows, 2, axis=0).reshape(-1, shown.shape[2])
+    off, count = (v_n - velocity)[:, :2], shown.shape[2]
+    found, _ = hann_means(time, np.hstack([off, shown.reshape(len(time), -1)]), float(time[0]), SPAN)
+    apart = np.diff(found, 2, axis=0)
+    z, H = apart[:, :2].reshape(-1), apart[:, 2:].reshape(-1, count)
     there = np.isfinite(z)
     if there.sum() < FEWEST:
         return None
@@ -143,17 +145,3 @@ def _turning(course: Track, time: Array) -> tuple[Array, Array]:
 
     slope = CubicSpline(course.time, course.C_nb.reshape(-1, 9)).derivative()(time)
     return motion_at(course, time)[0], np.asarray(slope).reshape(-1, 3, 3)
-
-
-def _means(time: Array, rows: Array) -> Array:
-    """(K, ...) means of rows by Hann's windows, `SPAN` apart; NaN where fewer than half of the usual number of rows are."""
-    place = (time - time[0]) / SPAN
-    first = place.astype(int)
-    weight = np.cos(0.5 * np.pi * (place - first)) ** 2
-    sums, total = np.zeros((first[-1] + 2, *rows.shape[1:])), np.zeros(first[-1] + 2)
-    wide = (-1, *(1,) * (rows.ndim - 1))
-    for at, part in ((first, weight), (first + 1, 1.0 - weight)):
-        np.add.at(sums, at, part.reshape(wide) * rows)
-        np.add.at(total, at, part)
-    full = total > 0.5 * np.median(total)
-    return np.where(full.reshape(wide), sums / np.where(full, total, 1.0).reshape(wide), np.nan)

@@ -57,32 +57,52 @@ def over_waves(course: Track, velocity: Array, noise: float, start: int) -> Calm
     n = max(1, round(SPAN / course.interval))
     if n == 1:
         return Calm(velocity, course, noise)
-    window = np.cos(0.5 * np.pi * np.arange(1 - n, n) / n) ** 2
-    there: NDArray[np.bool_] = np.asarray(np.isfinite(velocity).all(axis=1))
-
-    def summed(rows: Array) -> Array:
-        flat = np.where(there[:, None], rows.reshape(len(rows), -1), 0.0)
-        return np.stack([np.convolve(column, window, "same") for column in flat.T], axis=1).reshape(rows.shape)
-
-    total = np.convolve(there.astype(float), window, "same")
-    usual = float(np.median(total[there])) if there.any() else 1.0
-    known = np.zeros(len(course), dtype=np.bool_)
-    known[start + n : len(course) - n + 1 : n] = True
-    known[total <= 0.5 * usual] = False
-    divisor = np.where(total > 0.0, total, 1.0)
-    off = summed(course.v_n[:, :2] - velocity) / divisor[:, None]
-    seen = replace(
-        course,
-        C_nb=np.where((total > 0.0)[:, None, None], summed(course.C_nb) / divisor[:, None, None], course.C_nb),
-        v_n=np.where((total > 0.0)[:, None], summed(course.v_n) / divisor[:, None], course.v_n),
-    )
-    # Changes of speed, along the hull: in a turn it has none.
+    there = np.flatnonzero(np.isfinite(velocity).all(axis=1))
+    if not len(there):
+        return Calm(velocity, course, noise)
     along = np.gradient(np.einsum("kji,kj->ki", course.C_nb, course.v_n)[:, :2], course.interval, axis=0)
-    push = np.linalg.norm(summed(along) / divisor[:, None], axis=1)
-    size = noise * float(np.sqrt(np.sum(window**2) / (np.sum(window) * usual)))
-    rough = np.diff(off[known], 2, axis=0)
-    if len(rough) >= FEWEST:
+    parts = (course.v_n[:, :2] - velocity, course.C_nb.reshape(-1, 9), course.v_n, along)
+    rows = np.concatenate([part[there] for part in parts], axis=1)
+    found, weights = hann_means(course.time[there], rows, float(course.time[start]), n * course.interval)
+    at = start + n * np.arange(len(found))
+    inside = (at > start) & (at + n <= len(course))  # with a whole window
+    at, found = at[inside], found[inside]
+    size = noise * float(np.sqrt(np.nanmedian(weights[inside]))) if inside.any() else noise
+    rough = np.diff(found[:, :2], 2, axis=0)
+    rough = rough[np.isfinite(rough)]
+    if len(rough) >= 2 * FEWEST:
         size = max(float(1.4826 * np.median(np.abs(rough)) / np.sqrt(ROUGH)), LEAST_NOISE)
-    least = float(np.median(push[known])) if known.any() else 0.0  # a ship that always does has no others
-    known &= LATE * push <= max(size, LATE * least)
-    return Calm(np.where(known[:, None], course.v_n[:, :2] - off, np.nan), seen, float(np.sqrt(OVERLAP)) * size)
+    push = np.linalg.norm(found[:, 14:], axis=1)  # along the hull: in a turn it has none
+    least = float(np.nanmedian(push)) if np.isfinite(push).any() else 0.0  # a ship that always does has no others
+    with np.errstate(invalid="ignore"):
+        taken = LATE * push <= max(size, LATE * least)
+    at, found = at[taken], found[taken]
+    calm, C_nb, v_n = np.full_like(velocity, np.nan), course.C_nb.copy(), course.v_n.copy()
+    calm[at] = course.v_n[at, :2] - found[:, :2]
+    C_nb[at], v_n[at] = found[:, 2:11].reshape(-1, 3, 3), found[:, 11:14]
+    return Calm(calm, replace(course, C_nb=C_nb, v_n=v_n), float(np.sqrt(OVERLAP)) * size)
+
+
+def hann_means(time: Array, rows: Array, first: float, span: float) -> tuple[Array, Array]:
+    """Means of rows (M, n) by Hann's windows, twice `span` long, about ``first + k span``.
+
+    Returns
+    -------
+    means : (K, n) array
+        NaN where half of the usual number of rows is missing.
+    variance : (K,) array
+        Of a mean of white noise of unit variance.
+    """
+    place = np.maximum((time - first) / span, 0.0)
+    before = place.astype(int)
+    weight = np.cos(0.5 * np.pi * (place - before)) ** 2
+    count = int(before[-1]) + 2
+    sums, total, square = np.zeros((count, rows.shape[1])), np.zeros(count), np.zeros(count)
+    for at, part in ((before, weight), (before + 1, 1.0 - weight)):
+        part = np.where(time >= first, part, 0.0)
+        np.add.at(sums, at, part[:, None] * rows)
+        total += np.bincount(at, part, minlength=count)
+        square += np.bincount(at, part**2, minlength=count)
+    full = total > 0.5 * float(np.median(total))
+    divisor = np.where(full, total, np.nan)
+    return sums / divisor[:, None], square / divisor**2
