@@ -63,6 +63,16 @@ def test_between_rows_the_gyros_carry_the_angles(axes, sway):
     assert carried.sigma(float(encoder.time[-1])) == 0.0
 
 
+def test_an_encoder_that_goes_on_after_the_imu_does_not_turn_it():
+    """Its next row, .4 of an interval of the IMU after the last one, in a slew: it was taken for the last row's own angle."""
+    angles, record, _ = turned("zx", 0.0, len(TIME) - 3)
+    end = int(59.5 * RATE)  # in the middle of the last slew
+    time = np.append(TIME[:end:EVERY], TIME[end] + 0.4 / RATE)
+    between = np.stack([np.interp(time, TIME, column) for column in angles.T], axis=1)
+    carried = carried_angles(EncoderRecord(time, between), record.between(None, TIME[end] + 1e-6), "zx")
+    assert np.abs(carried.record.angles[-1] - angles[end]).max() < 1e-4
+
+
 def test_what_the_body_turns_after_the_last_row_is_in_sigma():
     """Bodies of all phases: the error of the last angles, by their sigma."""
     ratios = []

@@ -17,6 +17,7 @@ from truenorth.quality.encoder import encoder_evidence
 from truenorth.quality.gnss import gnss_evidence, turn_evidence
 from truenorth.quality.tilt import check_tilt
 from truenorth.quality.whiteness import whiteness
+from truenorth.records.specified import seen_in
 
 SEED = 11
 # Procedure and faults that gave a wrong answer without a word before there was one judge.
@@ -168,7 +169,7 @@ def test_noise_of_each_stretch_is_separated_from_sway():
     from truenorth.quality.density import bursts, noise_densities
 
     inputs, _ = BENCHES["swaying"].draw(SEED, 0)
-    record, spec = inputs["record"], inputs["imu"].seen_in(inputs["record"])
+    record, spec = inputs["record"], seen_in(inputs["imu"], inputs["record"])
     _, density = noise_densities(record)
     said = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3)
     assert np.nanmedian(density, axis=0) == pytest.approx(said, rel=0.05)

@@ -1,5 +1,7 @@
 """Live alignment: the answer of the whole log, whatever the chunks; hostile rows counted; memory bounded."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,17 @@ def test_the_last_answer_is_that_of_the_whole_log_to_the_bit(record, chunk):
     assert np.array_equal(found.C_nb, whole.C_nb)
     assert np.array_equal(found.phi_covariance, whole.phi_covariance)
     assert found.status == whole.status == "aligned"
+
+
+def test_known_lags_are_taken_off_the_stamps(record):
+    """As in the batch: the answer holds when the sensors felt what the last row says."""
+    late = replace(imu_spec("navigation"), gyro_latency=0.004, accel_latency=0.004)
+    with Aligner(PLACE, late, kind=record.kind, background=False) as aligner:
+        pushed(aligner, record, 13)
+        found = aligner.finish()
+    whole = align(record, PLACE, late)
+    assert found.time == whole.time == record.time[-1] - 0.004
+    assert np.array_equal(found.C_nb, whole.C_nb)
 
 
 @pytest.mark.slow

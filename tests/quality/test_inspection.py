@@ -115,6 +115,18 @@ def test_the_crest_of_a_smooth_motion_through_a_coarse_quantum_is_no_saturation(
         assert ("saturated" in codes(inspect(ImuRecord(record.time, gyro, record.accel)))) == found
 
 
+def test_a_steady_turn_between_two_counts_is_no_saturation():
+    """Remainders are carried on: rows stand at two counts by turns. What is clipped stands at one."""
+    record = base(duration=60.0)
+    t = record.time - record.time[0]
+    turn = np.clip(t - 20.0, 0.0, 1.0) - np.clip(t - 40.0, 0.0, 1.0)
+    accel = record.accel.copy()
+    for size, found in ((40.1, False), (60.0, True)):
+        counts = np.floor(np.cumsum(np.minimum(size * turn, 40.1 if not found else 40.0)))
+        accel[:, 0] = 0.15 * np.diff(counts, prepend=0.0)
+        assert ("saturated" in codes(inspect(ImuRecord(record.time, record.gyro, accel)))) == found
+
+
 def test_increments_that_differ_in_their_last_digits_are_one_quantum():
     """Differences of a count: at a crest a row of the uppermost quantum differs by rounding, and noise takes one further down."""
     record = base(duration=60.0)

@@ -21,6 +21,7 @@ from truenorth.strapdown.increments import increments
 Array = NDArray[np.float64]
 
 COVER = 0.05  # s by which an encoder's log may begin late or end early
+ROUNDING = 1e-3  # of a row, by which stamps of one moment differ: beyond the edges the gyros say nothing
 FEWEST = 4  # rows that a spline needs
 PASSES = 2  # the direction of an outer axis in the IMU is known by straight lines at first
 
@@ -72,7 +73,7 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     dtheta, _ = increments(record)
     edges = np.append(record.time[0] - record.interval, record.time)
     angles = angles_at(encoder, edges, axes)
-    slack = 0.5 * record.interval
+    slack = ROUNDING * record.interval
     rows = (encoder.time >= edges[0] - slack) & (encoder.time <= edges[-1] + slack)
     if np.count_nonzero(rows) < FEWEST:
         return CarriedAngles(replace(encoder, time=edges, angles=_shaped(angles)), float(encoder.time[-1]), 0.0)

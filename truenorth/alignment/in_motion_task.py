@@ -44,6 +44,7 @@ from truenorth.quality.slow_aids import (
 from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
+from truenorth.records.specified import corrected, seen_in
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import BA
@@ -209,9 +210,7 @@ def moving_task(
     if imu is None:
         raise UsageError("alignment on the move needs the IMU's specification: imu='navigation', a file or an ImuSpec")
     spec = with_rounding(imu_spec(imu), record)
-    if calibration is not None:
-        record = calibration.apply(record)
-    record, _, gaps = bridge_gaps(record)
+    record, _, gaps = bridge_gaps(corrected(record, spec, calibration))
     if record.duration < SHORTEST:
         raise AlignmentError(f"{record.source}: {record.duration:g} s; at least {SHORTEST:g} s are needed on the move")
     odometer = None if odometer is None else odometer.shifted(offset)
@@ -224,7 +223,7 @@ def moving_task(
         position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
         check_fixes(gnss, position, float(record.time[0]))
-    spec = spec.seen_in(record).with_coning_of(record)
+    spec = seen_in(spec, record).with_coning_of(record)
     stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)

@@ -38,6 +38,7 @@ from truenorth.quality.noise import noise_coefficients
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
+from truenorth.records.specified import corrected
 from truenorth.records.specs import PRESETS, ImuSpec, imu_spec
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity
 
@@ -101,9 +102,7 @@ def align_positions(
     if not arm_sigma >= 0.0:
         raise UsageError(f"arm_sigma {arm_sigma:g} m; expected zero or more")
     spec = None if imu is None else noise_in(record, imu_spec(imu))
-    if calibration is not None:
-        record = calibration.apply(record)
-    task = make_task(bridged(record), position, None)
+    task = make_task(bridged(corrected(record, spec, calibration)), position, None)
     tell("looking for positions")
     stretches = find_positions(task.motion)
     if not stretches:

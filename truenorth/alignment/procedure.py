@@ -58,6 +58,7 @@ from truenorth.quality.record_evidence import record_evidence
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
+from truenorth.records.specified import corrected
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -131,9 +132,7 @@ def align_base(
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     spec = None if imu is None else noise_in(record, imu_spec(imu)).with_coning_of(record)
-    if calibration is not None:
-        record = calibration.apply(record)
-    record = bridged(record)
+    record = bridged(corrected(record, spec, calibration))
     if record.duration < SHORTEST or len(record) < 10:
         raise AlignmentError(
             f"{record.source}: {len(record)} samples over {record.duration:g} s; at least 10 samples and {SHORTEST:g} s "

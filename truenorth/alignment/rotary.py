@@ -43,6 +43,7 @@ from truenorth.errors.staying import StaticModel
 from truenorth.quality.encoder import encoder_evidence, zero_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
+from truenorth.records.specified import corrected
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Effect, Evidence, notes
 from truenorth.state.limits import limit
@@ -122,7 +123,7 @@ def align_rotary(
     if not 0.0 <= offset_sigma < math.inf:
         raise UsageError(f"offset_sigma is {offset_sigma}; expected no negative length, m")
     given = None if imu is None else noise_in(record, imu_spec(imu))
-    record = bridged(record)
+    record = bridged(corrected(record, given))
     if record.duration < SHORTEST:
         raise AlignmentError(
             f"{record.source}: {record.duration:.1f} s; a base that may sway needs {SHORTEST:g} s at least: record longer"

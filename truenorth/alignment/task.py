@@ -19,6 +19,7 @@ from truenorth.core.errors import DataError
 from truenorth.core.position import Position
 from truenorth.quality.regimes import MotionSummary, motion_summary
 from truenorth.records import ImuRecord
+from truenorth.records.specified import seen_in
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.increments import across_gaps
 from truenorth.strapdown.inertial import earth_rotation
@@ -135,7 +136,7 @@ def noise_in(record: ImuRecord, imu: ImuSpec) -> ImuSpec:
     imu : ImuSpec
         The specification.
     """
-    return imu.seen_in(record).with_more_noise(*(lost_walk(record, x) for x in (record.gyro, record.accel)))
+    return seen_in(imu, record).with_more_noise(*(lost_walk(record, x) for x in (record.gyro, record.accel)))
 
 
 def lost_walk(record: ImuRecord, x: Array) -> float:

@@ -39,6 +39,7 @@ from truenorth.quality.rounding import with_rounding
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
+from truenorth.records.specified import corrected
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -145,9 +146,7 @@ def align_transfer(
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
     spec = noise_in(slave, with_rounding(imu_spec("industrial" if imu is None else imu), slave)).with_coning_of(slave)
     where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
-    if calibration is not None:
-        slave = calibration.apply(slave)
-    slave = bridged(slave)
+    slave = bridged(corrected(slave, spec, calibration))
 
     tell("comparing the clocks")
     C_mb = np.asarray(dcm_from_euler(*angles))

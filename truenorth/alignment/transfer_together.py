@@ -59,12 +59,14 @@ def as_said_together(track: Track, model: TransferModel, said: Assumed, seats: b
     if MOUNTING in groups:
         off = rotation_vector_from_dcm(C_mb @ said.C_mb.T)
         terms.append((MOUNTING, C_mb, off, np.full(3, said.mounting_sigma)))
-    known = [term for term in terms if np.all(term[3] > 0.0)]
-    information = np.sum([J.T @ (J / sigma[:, None] ** 2) for _, J, _, sigma in known], axis=0)
+    if any(np.any(J[sigma == 0.0]) for _, J, _, sigma in terms):
+        return track  # one of them cannot turn
+    weights = [np.where(sigma > 0.0, 1.0 / np.where(sigma > 0.0, sigma, 1.0) ** 2, 0.0) for *_, sigma in terms]
+    information = np.sum([J.T @ (J * w[:, None]) for (_, J, _, _), w in zip(terms, weights, strict=True)], axis=0)
     variance = np.asarray(np.linalg.inv(information), dtype=np.float64)
     K, s = np.zeros((3, model.states)), np.zeros(3)
-    for name, J, x, sigma in known:
-        own = variance @ (J / sigma[:, None] ** 2).T
+    for (name, J, x, _), w in zip(terms, weights, strict=True):
+        own = variance @ (J * w[:, None]).T
         K[:, at(name)] = own
         s -= own @ x
     return _turned(track, model, said, s, variance, K)

@@ -42,6 +42,7 @@ from truenorth.live.reasons import reasons_of
 from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
 from truenorth.records import ImuRecord
+from truenorth.records.specified import in_time
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.track import Residuals
 
@@ -98,12 +99,16 @@ class Aligner:
         if not 0.0 < share <= 1.0:
             raise UsageError(f"share {share}; expected a part of one core above 0, at most 1")
         self.place = None if place is None else Position.of(place)
-        self.imu, self.method, self.share = None if imu is None else imu_spec(imu), method, share
+        self.imu: ImuSpec | None = None
+        late = 0.0
+        if imu is not None:
+            self.imu, late = in_time(imu_spec(imu))
+        self.method, self.share = method, share
         self.feeds = {feed.key: feed for feed in aid if isinstance(feed, Feed)}
         self.turner = next((a for a in aid if isinstance(a, Turner)), None)
         self.log = Log(kind, most_rows)
         self.on_taken(None)
-        self.intake = Intake()
+        self.intake = Intake(late)
         self.onward = Onward(kind)
         self.failure = ""
         self.solutions = 0

@@ -80,9 +80,16 @@ def as_rows(time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> Array:
 
 
 class Intake:
-    """Sifts rows ``time, gyro (3), accel (3)`` in SI units."""
+    """Sifts rows ``time, gyro (3), accel (3)`` in SI units.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    late : float, s
+        By which the sensors are late, as their specification says; the stamps become earlier by it.
+    """
+
+    def __init__(self, late: float = 0.0) -> None:
+        self.late = late
         self.counts = Counts()
         self._newest = -np.inf
         self._recent: deque[Array] = deque()  # times of the blocks of the last `LATE` seconds
@@ -96,6 +103,7 @@ class Intake:
         rows : (K, 7) array
         """
         sound = self._sound(rows)
+        sound[:, 0] -= self.late
         if not len(sound):
             return []
         if not self._ahead and self._goes_on(sound[:, 0]):

@@ -40,6 +40,7 @@ from truenorth.navigation.start import force_at_rest
 from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
+from truenorth.records.specified import in_time
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.layout import DP, DV
@@ -99,7 +100,8 @@ class Navigator:
         output: float = 1.0,
         most_rows: int = MOST_ROWS,
     ) -> None:
-        self.start, self.spec, self._imu_source = start_of(start, imu)
+        self.start, spec, self._imu_source = start_of(start, imu)
+        self.spec, late = in_time(spec)
         self._given, self._imu = start, imu
         self.solution = start if isinstance(start, Alignment) else None
         self.feeds = {feed.key: feed for feed in feeds if feed.navigates}
@@ -107,7 +109,7 @@ class Navigator:
         self.start = arm_as_begun(self.start, self._mountings.get(Gnss.key))
         dummies: dict[str, Aid] = {key: feed.aid_of(feed.dummy()) for key, feed in self.feeds.items()}
         self.altitude, self._why = kept_altitude(altitude, dummies)
-        self.intake, self.log = Intake(), Log(kind, most_rows)
+        self.intake, self.log = Intake(late), Log(kind, most_rows)
         self.output = output
         self.failure = ""
         self.past = Past()
@@ -134,7 +136,7 @@ class Navigator:
             Shapes that do not fit.
         """
         rows = as_rows(time, gyro, accel)
-        rows = rows[~(rows[:, 0] <= self.start.time)]
+        rows = rows[~(rows[:, 0] - self.intake.late <= self.start.time)]
         with self._lock:
             for block in self.intake.sift(rows):
                 if not self.log.add(block):
@@ -208,7 +210,7 @@ class Navigator:
                 self._given,
                 aid=list(aids.values()),
                 altitude=self._kept_with(aids),
-                imu=self._imu,
+                imu=self.spec if self.intake.late else self._imu,
                 interval=FINE,
                 output=self.output,
             )

@@ -50,6 +50,7 @@ from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
 from truenorth.records import GnssRecord, ImuRecord, Late
+from truenorth.records.specified import corrected, seen_in
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import SLOW_ACCEL, SLOW_GYRO
@@ -143,10 +144,10 @@ def navigate(
     begin, spec, imu_source = start_of(start, imu)
     check_start(begin)
     log = ImuRecord.of(record)
-    record = _from_start(log if calibration is None else calibration.apply(log), begin)
+    record = _from_start(corrected(log, spec, calibration), begin)
     check_start_at_rest(begin, record)
     record, gaps, disturbances = bridge_gaps(record)
-    noise = with_rounding(spec, log).seen_in(record)
+    noise = seen_in(with_rounding(spec, log), record)
     said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None

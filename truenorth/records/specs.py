@@ -193,10 +193,6 @@ class ImuSpec:
             accel_random_walk=math.hypot(self.accel_random_walk, accel),
         )
 
-    def seen_in(self, record: ImuRecord) -> ImuSpec:
-        """What a filter sees in a record: the noise of samples, and what its scattered time stamps make of its motion."""
-        return self.with_random_walks(record.interval).with_more_noise(*record.stamp_walks)
-
     def with_coning_of(self, record: ImuRecord) -> ImuSpec:
         """With the drift that the coning of a base leaves between rows, as a bias: what integrates these rows has it."""
         drift = coning_left(record)
