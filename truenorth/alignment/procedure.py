@@ -132,7 +132,11 @@ def align_base(
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     spec = None if imu is None else noise_in(record, imu_spec(imu)).with_coning_of(record)
-    record = bridged(corrected(record, spec, calibration))
+    written, record = record, corrected(record, spec, calibration)
+    # Counts, and rows that repeat, are looked for in what the sensors wrote.
+    written = bridged(written) if written is not record else None
+    record = bridged(record)
+    written = record if written is None else written
     if record.duration < SHORTEST or len(record) < 10:
         raise AlignmentError(
             f"{record.source}: {len(record)} samples over {record.duration:g} s; at least 10 samples and {SHORTEST:g} s "
@@ -163,11 +167,11 @@ def align_base(
     answer = replace(found.answer, method=chosen, method_reason=why)
     moves = None if math.isfinite(found.way) and _explained(task.motion, found) else task.motion.moves_at
     biased = math.sqrt(float(answer.imu.bias_variance[3:].max()))
-    evidence = record_evidence(task.record, task.motion, sound=sound, accel_bias=biased) + leaves(moves)
+    evidence = record_evidence(written, task.motion, sound=sound, accel_bias=biased) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)
-    evidence += [] if sound else quantum_evidence(task.record, position.lat)
+    evidence += [] if sound else quantum_evidence(written, position.lat)
     if method in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
         evidence += against(own, answer)

@@ -223,7 +223,8 @@ def _of_encoder(
     found = encoder_evidence(record, given, readings, gyro_bias)
     found += record_evidence(record, task.motion, given, accel_bias=accel_bias)
     if len(axes) == 2:
-        found += zero_evidence(record, given, _inner(encoder, axes))
+        outer, inner = np.abs(np.diff(encoder.angles, axis=0)).sum(axis=0)
+        found += zero_evidence(record, given, _inner(encoder, axes), outer / max(inner, 1e-9))
     return found + notes(encoder.notes)
 
 

@@ -271,8 +271,8 @@ SENTENCES = {
         "({rate:deg/s|.2g} deg/s RMS): no base that stays does"
     ),
     "encoder.zero": (
-        "the zero of the inner axis' angle is off by {off:deg|+.2f} ± {sigma:deg|.2f} deg: the base would wobble as the outer axis "
-        "turns"
+        "the zero of the inner axis' angle is off by {off:deg|+.3f} ± {sigma:deg|.3f} deg, or the encoder is late or early: the "
+        "base would wobble as the outer axis turns"
     ),
     "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
     "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
