@@ -7,6 +7,7 @@ import pytest
 
 from truenorth.alignment.transfer_delay import likeliest_delay
 from truenorth.alignment.transfer_start import parted_clocks
+from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
@@ -43,3 +44,15 @@ def test_a_clock_that_steps_between_them_is_named(logs):
     slave, master = logs
     stepped = replace(master, time=master.time + 3.0 * (master.time > 100.0))
     assert parted_clocks(slave, stepped, np.eye(3), 0.0) is not None
+
+
+@pytest.mark.parametrize("run", range(3))
+def test_what_happened_in_an_outage_has_no_course_in_time(run):
+    """A turn that begins while the master is silent: between its rows it would seem to turn slowly all the while."""
+    inputs, _ = BENCHES["attitude"].draw(11, run)
+    slave, master = inputs["record"], inputs["master"]
+    turns = np.abs(np.diff(np.unwrap(np.arctan2(master.C_nb[:, 0, 1], master.C_nb[:, 1, 1]))))
+    begin = master.time[np.argmax(turns > 0.5 * turns.max())] - 1.0
+    heard = np.flatnonzero((master.time < begin) | (master.time > begin + 6.0))
+    rows = {name: getattr(master, name)[heard] for name in ("time", "lat", "lon", "alt", "v_n", "C_nb")}
+    assert parted_clocks(slave, replace(master, **rows), np.eye(3), 0.0) is None

@@ -132,11 +132,10 @@ def align_base(
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     spec = None if imu is None else noise_in(record, imu_spec(imu)).with_coning_of(record)
-    written, record = record, corrected(record, spec, calibration)
-    # Counts, and rows that repeat, are looked for in what the sensors wrote.
-    written = bridged(written) if written is not record else None
+    as_written, record = record, corrected(record, spec, calibration)
+    untouched = as_written is record
     record = bridged(record)
-    written = record if written is None else written
+    written = record if untouched else bridged(as_written)  # counts, and rows that repeat, are what the sensors wrote
     if record.duration < SHORTEST or len(record) < 10:
         raise AlignmentError(
             f"{record.source}: {len(record)} samples over {record.duration:g} s; at least 10 samples and {SHORTEST:g} s "

@@ -34,6 +34,7 @@ SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
 FIRST = 1.0  # s over which those are taken
 AGAIN = 5.0  # s: sooner no manoeuvre comes again
+OUTAGE = 3.0  # intervals without a row
 MISFIT = 2.0  # times the part of a motion that the best delay leaves: another delay that leaves more is another clock's
 
 
@@ -81,6 +82,14 @@ def _fits(slave: ImuRecord, master: MasterRecord, assumed: Assumed, best: float)
     return _left(slave, master, assumed.C_mb, assumed.delay) < MISFIT * (1.0 - best**2)
 
 
+def _unbroken(master: MasterRecord) -> MasterRecord:
+    """The longest stretch of a log without an outage: what happened in one has no course in time."""
+    ends = np.flatnonzero(np.diff(master.time, append=np.inf) > OUTAGE * master.interval)
+    begins = np.append(0, ends[:-1] + 1)
+    longest = int(np.argmax(ends - begins))
+    return master[begins[longest] : ends[longest] + 1]
+
+
 def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> Evidence | None:
     """That the first and the last third of what both logs show are late by different delays; None where nothing says so.
 
@@ -96,14 +105,16 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: fl
         return None
     # Half a window: where the agreement is just sure, a delay is found to a tenth of it.
     shortest = max(0.5 * WINDOW["rate" if master.C_nb is not None else "force"], master.interval)
-    parts = master[:first], master[last:]
+    parts = _unbroken(master[:first]), _unbroken(master[last:])
+    if min(map(len, parts)) < 2:
+        return None
     begin, end = (find_delay(slave, part, C_mb) for part in parts)
     if not (begin.sure and end.sure) or abs(end.delay - begin.delay) < shortest:
         return None
     # What comes again and again, such as a sea or a rotor, agrees at many delays, and chance says which is best: one that fits
     # both parts is that of the clock.
     own = [_left(slave, part, C_mb, found.delay) for part, found in zip(parts, (begin, end), strict=True)]
-    for one in (begin.delay, end.delay, likeliest_delay(slave, master, C_mb)):
+    for one in (begin.delay, end.delay, likeliest_delay(slave, _unbroken(master), C_mb)):
         if all(_left(slave, part, C_mb, one) < MISFIT * least for part, least in zip(parts, own, strict=True)):
             return None
     return contradiction(

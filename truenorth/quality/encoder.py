@@ -99,7 +99,7 @@ def zero_evidence(
     if len(windows) < FEWEST_WINDOWS:
         return []
     found, *others = ([_along(turn, axis, swept, part) for part in windows] for axis in (u, *_unlike(u)))
-    scatter = np.concatenate([found - np.mean(found), *others])
+    scatter = np.concatenate([np.array(found) - np.mean(found), *others])
     off, sigma = -float(np.mean(found)), SHARED * math.sqrt(float(np.mean(scatter**2)) / len(found))
     if abs(off) < max(limit("indexer"), student_limit(limit("few turns"), 3 * len(found) - 1)) * sigma:
         return []
