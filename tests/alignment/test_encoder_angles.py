@@ -1,6 +1,6 @@
 """Angles of an indexer between an encoder's rows: the gyros see a slew as it is; what remains is the body's own turn."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -60,7 +60,21 @@ def test_between_rows_the_gyros_carry_the_angles(axes, sway):
     assert straight[inside].max() > 4e-3
     assert off[inside].max() < 1e-4
     assert off[-1].max() < 1e-9 + 4.0 * carried.sigma(TIME[-1])  # beyond its last row, by 80 ms of a slew
-    assert carried.sigma(float(encoder.time[-1])) == 0.0
+    assert (
+        carried.sigma(float(encoder.time[-1])) < 1e-5
+    )  # no noise: the little that differences leave of the body's motion
+
+
+def test_noise_of_the_encoder_is_in_sigma():
+    """It is found, and so is what it does to the tangent along which the last rows go on."""
+    angles, record, encoder = turned("zx", 0.07, len(TIME) - 3)
+    off = []
+    for seed in range(6):
+        noise = 1e-3 * np.random.default_rng(seed).standard_normal(encoder.angles.shape)
+        carried = carried_angles(replace(encoder, angles=encoder.angles + noise), record, "zx")
+        assert carried.sigma(carried.last) == pytest.approx(1e-3, rel=0.15)
+        off.append((carried.record.angles[-1] - angles[-1]) / carried.sigma(float(TIME[-1])))
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5
 
 
 def test_an_encoder_that_goes_on_after_the_imu_does_not_turn_it():

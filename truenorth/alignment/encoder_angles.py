@@ -7,6 +7,7 @@ body, which is smooth.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 COVER = 0.05  # s by which an encoder's log may begin late or end early
 ROUNDING = 1e-3  # of a row, by which stamps of one moment differ: beyond the edges the gyros say nothing
 FEWEST = 4  # rows that a spline needs
+MOST_DIFFERENCES = 8
 PASSES = 2  # the direction of an outer axis in the IMU is known by straight lines at first
 
 
@@ -36,17 +38,29 @@ class CarriedAngles:
         At the edges of the IMU's rows.
     last : float, s
         The encoder's own last row: beyond it the gyros alone carry the angles, and take what the body does for what it did.
+    step : float, s
+        Between its rows.
     swing : float, rad/s^2
         RMS of the body's angular acceleration about the axes, which they do not know of there.
+    noise : float, rad
+        White noise of the encoder's rows, steps of its resolution included.
     """
 
     record: EncoderRecord
     last: float
+    step: float
     swing: float
+    noise: float
 
     def sigma(self, time: float) -> float:
-        """One sigma at a time (s), rad: what the body may have turned since the encoder's last row."""
-        return 0.5 * self.swing * max(time - self.last, 0.0) ** 2
+        """One sigma at a time (s), rad: noise of the rows, and what the body may have turned since the last one.
+
+        Beyond it the angle goes on by the spline's tangent, the slope of a cubic through its last four rows,
+        ``(11/6, -3, 3/2, -1/3)/step``, with their noise.
+        """
+        beyond = max(time - self.last, 0.0)
+        rows = beyond / self.step * np.array([11.0 / 6.0, -3.0, 1.5, -1.0 / 3.0]) + (1.0, 0.0, 0.0, 0.0)
+        return math.hypot(self.noise * float(np.linalg.norm(rows)), 0.5 * self.swing * beyond**2)
 
 
 def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str]) -> CarriedAngles:
@@ -76,7 +90,9 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     slack = ROUNDING * record.interval
     rows = (encoder.time >= edges[0] - slack) & (encoder.time <= edges[-1] + slack)
     if np.count_nonzero(rows) < FEWEST:
-        return CarriedAngles(replace(encoder, time=edges, angles=_shaped(angles)), float(encoder.time[-1]), 0.0)
+        return CarriedAngles(
+            replace(encoder, time=edges, angles=_shaped(angles)), float(encoder.time[-1]), math.inf, 0.0, 0.0
+        )
     time = encoder.time[rows]
     given = angles_at(encoder, time, axes)
     for _ in range(PASSES):
@@ -89,7 +105,17 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
         inside = np.clip(edges, time[0], time[-1])
         angles = by_gyros + of_body(inside) + (edges - inside)[:, None] * of_body(inside, 1)
     swing = float(np.sqrt(np.max(np.mean(of_body(time, 2) ** 2, axis=0))))
-    return CarriedAngles(replace(encoder, time=edges, angles=_shaped(angles)), float(time[-1]), swing)
+    noise, step = _white(given - at_rows), float(np.median(np.diff(time)))
+    carried = replace(encoder, time=edges, angles=_shaped(angles))
+    return CarriedAngles(carried, float(time[-1]), step, swing, noise)
+
+
+def _white(y: Array) -> float:
+    """White noise of the noisiest column of a smooth motion, by its differences: each order shows noise, and less of motion."""
+    orders = range(2, min(MOST_DIFFERENCES, len(y) - 1) + 1)
+    return math.sqrt(
+        min(float(np.mean(np.diff(y, n, axis=0) ** 2, axis=0).max()) / math.comb(2 * n, n) for n in orders)
+    )
 
 
 def _axes_seen(axes: Sequence[str], angles: Array) -> Array:
