@@ -14,6 +14,7 @@ from benchmarks.honesty import (
     moving,
     navigation,
     sailing,
+    specified,
     staying,
     transfer,
     turning,
@@ -34,6 +35,7 @@ CASES = (
     *driving.CASES,
     *foreign_rows.CASES,
     *sailing.CASES,
+    *specified.CASES,
 )
 
 if __name__ == "__main__":
