@@ -101,8 +101,8 @@ def even(track: Track) -> Track:
 
 def corrected(damped: Track, found: Found, start: int) -> Track:
     """A track whose errors are taken off, with the bands that are left; correlations are not given."""
-    P, sensors, estimate = damped.P.copy(), damped.sensors.copy(), found.estimate
-    variance = np.einsum("kii->ki", P)[start:].copy()
+    P, sensors, estimate = np.zeros(damped.P.shape), damped.sensors.copy(), found.estimate
+    variance = np.einsum("kii->ki", damped.P[start:]).copy()
     if found.bands is not None:
         sigma = found.bands.errors
     else:
@@ -112,9 +112,8 @@ def corrected(damped: Track, found: Found, start: int) -> Track:
             sensors[start:, there] += estimate.x[:, own]
             variance[:, there] = estimate.sigma[:, own] ** 2
     variance[:, LEVEL] = sigma**2
-    P[start:] = 0.0
-    states = np.arange(P.shape[1])
-    P[start:, states, states] = variance
+    P[:start] = damped.P[:start]
+    np.einsum("kii->ki", P)[start:] = variance
     return replace(damped, P=P, sensors=sensors)
 
 
