@@ -100,9 +100,14 @@ def even(track: Track) -> Track:
 
 
 def corrected(damped: Track, found: Found, start: int) -> Track:
-    """A track whose errors are taken off, with the bands that are left; correlations are not given."""
-    P, sensors, estimate = np.zeros(damped.P.shape), damped.sensors.copy(), found.estimate
-    variance = np.einsum("kii->ki", damped.P[start:]).copy()
+    """A track whose errors are taken off, with the bands that are left; correlations are not given.
+
+    The bands take the place of the covariances that they come from: of two days at 1 Hz these are 1 GB.
+    """
+    P, sensors, estimate = damped.P, damped.sensors.copy(), found.estimate
+    if not P.flags.writeable:
+        P = P.copy()
+    variance = np.einsum("kii->ki", P)[start:].copy()
     if found.bands is not None:
         sigma = found.bands.errors
     else:
@@ -112,7 +117,7 @@ def corrected(damped: Track, found: Found, start: int) -> Track:
             sensors[start:, there] += estimate.x[:, own]
             variance[:, there] = estimate.sigma[:, own] ** 2
     variance[:, LEVEL] = sigma**2
-    P[:start] = damped.P[:start]
+    P[start:] = 0.0
     np.einsum("kii->ki", P)[start:] = variance
     return replace(damped, P=P, sensors=sensors)
 
