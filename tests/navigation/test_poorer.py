@@ -52,7 +52,7 @@ def test_a_sound_drive_is_left_alone(runs):
         assert not _asked(result)
 
 
-@few_and_all(8, few=2)
+@few_and_all(8, few=1)
 @pytest.mark.parametrize(
     ("wrong", "key"),
     some(
