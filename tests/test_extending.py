@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import chi2
 
 import truenorth as tn
+from tests.runs import few_and_all
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.records import GnssRecord
@@ -22,7 +23,7 @@ from truenorth.state.layout import PHI
 from truenorth.state.state import Start
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
-SECONDS, RUNS, BIAS, NOISE = 60.0, 12, np.radians(4.0), np.radians(1.0)
+SECONDS, BIAS, NOISE = 60.0, np.radians(4.0), np.radians(1.0)
 IMU = imu_spec("industrial")
 SIGMA = np.concatenate([np.repeat([np.radians(0.2), 0.05, 2.0], 3), np.sqrt(IMU.bias_variance)])
 SIGMA[2] = np.radians(8.0)  # heading
@@ -75,15 +76,16 @@ def total_of(track, motion, bias):
     return error @ np.linalg.solve(P, error)
 
 
-def inside(total):
+def inside(total, runs):
     """Of two numbers a run; a false alarm in one of a thousand tests."""
-    low, high = chi2.ppf([5e-4, 1.0 - 5e-4], 2 * RUNS)
+    low, high = chi2.ppf([5e-4, 1.0 - 5e-4], 2 * runs)
     return low < total < high
 
 
-def test_navigation_is_honest_with_it(drive, plugin):
+@few_and_all(12)
+def test_navigation_is_honest_with_it(drive, plugin, runs):
     motion, total = drive[0], 0.0
-    for run in range(RUNS):
+    for run in range(runs):
         record, fixes, compass, bias, rng = run_of(drive, plugin, run)
         s = motion.states(0.0)
         dx = SIGMA * rng.standard_normal(15)
@@ -92,13 +94,14 @@ def test_navigation_is_honest_with_it(drive, plugin):
         start = Start(0.0, C, s.v_n + dx[3:6], *place, np.zeros(3), np.zeros(3), np.diag(SIGMA**2))
         result = tn.navigate(record, start, imu=IMU, aid=[tn.Gnss(fixes), compass], check_clocks=False)
         total += total_of(result.track, motion, bias)
-    assert inside(total)
+    assert inside(total, runs)
 
 
-def test_alignment_on_the_move_is_honest_with_it(drive, plugin):
+@few_and_all(12, few=5)
+def test_alignment_on_the_move_is_honest_with_it(drive, plugin, runs):
     total = 0.0
-    for run in range(RUNS):
+    for run in range(runs):
         record, fixes, compass, bias, _ = run_of(drive, plugin, run)
         result = tn.align(record, imu=IMU, aid=[tn.Gnss(fixes), compass])
         total += total_of(result.moving.track, drive[0], bias)
-    assert inside(total)
+    assert inside(total, runs)

@@ -35,7 +35,7 @@ def test_nothing_heavy_is_loaded(what):
 
 @pytest.mark.parametrize("what", ["the package", "its help"])
 def test_it_starts_within_its_budget(what):
-    """The best of five, by the processor's time: what else a machine does is not counted."""
+    """The best of five at most, by the processor's time: what else a machine does is not counted."""
 
     def spent() -> float:
         times = os.times()
@@ -46,7 +46,7 @@ def test_it_starts_within_its_budget(what):
         run(STARTS[what])
         return spent() - begin
 
-    assert min(once() for _ in range(5)) < BUDGET
+    assert any(once() < BUDGET for _ in range(5))
 
 
 def test_public_names_are_what_they_say():

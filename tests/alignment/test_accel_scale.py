@@ -23,7 +23,7 @@ def found_in(answer):
     return next((item for item in answer.evidence if item.key == "bias.accel_scale"), None)
 
 
-@pytest.mark.parametrize(("run", "scale"), some([(0, -0.05), (0, 0.05)], [(1, 0.05), (1, -0.05), (3, 0.1), (3, -0.1)]))
+@pytest.mark.parametrize(("run", "scale"), some([(0, -0.05)], [(0, 0.05), (1, 0.05), (1, -0.05), (3, 0.1), (3, -0.1)]))
 def test_the_size_along_the_inner_axis_is_that_of_the_scale_factor(run, scale):
     """To a quarter: the fit of the base's motion takes up a part (of other axes, which gravity turns through, a half and more)."""
     inputs, _ = BENCHES["rotary"].draw(SEED, run)
@@ -32,7 +32,7 @@ def test_the_size_along_the_inner_axis_is_that_of_the_scale_factor(run, scale):
     assert item.figures["scale"] == pytest.approx(scale, rel=0.25)
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("axis", some([0], [1, 2]))
 def test_a_small_one_that_no_specification_names_refuses_nothing(axis):
     """100 ppm are usual; what they do is far below sigma."""
     inputs, _ = BENCHES["rotary"].draw(SEED, 0)

@@ -40,7 +40,8 @@ def test_aligning_anew_is_asked_where_the_bend_can_be_seen():
 
 @pytest.fixture(scope="module")
 def hidden():
-    """An indexer whose fitted motion takes up a part of the bend: answers in both hemispheres, and their filters."""
+    """An indexer whose fitted motion takes up a part of the bend: answers in both hemispheres, their filters, and for each of
+    these how well both places fit."""
     inputs, _ = BENCHES["rotary"].draw(90411, 1)
     here, kept, of = inputs["place"], [], rotary.what_begins
 
@@ -52,12 +53,12 @@ def hidden():
         patch.setattr(rotary, "what_begins", keep)
         places = here, replace(here, lat=-here.lat)
         answers = [BENCHES["rotary"].align(inputs | {"place": place}) for place in places]
-    return places, answers, kept
+    return answers, kept, [[fine.misfit_at(place) for place in places] for fine in kept]
 
 
 def test_a_bend_that_a_fitted_motion_hides_is_found_by_aligning_anew(hidden):
     """Once silent: 15 sigmas of heading, by a ratio of 10 of the bend alone."""
-    _, (sound, wrong), _ = hidden
+    (sound, wrong), _, _ = hidden
     assert sound.status == "aligned"
     assert any("other hemisphere" in reason for reason in wrong.reasons)
 
@@ -83,14 +84,13 @@ def test_axes_of_a_swaying_imu_are_no_other_hemisphere():
 
 def test_how_well_a_place_fits_depends_on_no_place_that_was_given(hidden):
     """A log has one likelihood in each hemisphere, whichever the answer was made in: the ratio changes its sign with the place."""
-    places, _, fits = hidden
-    (here, there), by_the_other = ([fine.misfit_at(place) for place in places] for fine in fits)
+    _, _, ((here, there), by_the_other) = hidden
     np.testing.assert_allclose(by_the_other, [here, there], rtol=1e-9)
     assert there - here > limit("hemisphere refitted")
 
 
 def test_the_motion_is_fitted_until_it_settles(hidden):
     """One fit about the first answer leaves this log some hundred less likely than it is (twice the logarithm)."""
-    places, _, fits = hidden
-    for place, fine in zip(places, fits, strict=True):
-        assert fine.misfit_at(place) < -2.0 * float(fine.estimates.log_likelihood) - 100.0
+    _, fits, misfits = hidden
+    for number, fine in enumerate(fits):
+        assert misfits[number][number] < -2.0 * float(fine.estimates.log_likelihood) - 100.0

@@ -40,10 +40,10 @@ def test_align_and_go_on(files, tmp_path):
         "navigate", log, "--start", tmp_path / "start", "--odometer", odometer, "--estimate", "scale", "--json"
     )
     assert track.exit_code == 0, track.output
-    printed = call("align", log, *common)
+    printed = call("align", log, *common, "--to", 150)
     assert "heading of the vehicle" in printed.stdout
     assert "odometer: scale" in printed.stdout
-    unplaced = call("align", log, "--odometer", odometer, "--imu", "navigation", "--json")
+    unplaced = call("align", log, "--odometer", odometer, "--imu", "navigation", "--to", 150, "--json")
     assert unplaced.exit_code == 0, unplaced.output
     assert "the latitude was not given: found from the log" in unplaced.stdout
 

@@ -222,7 +222,7 @@ def test_rows_that_run_backwards_are_no_clock_that_is_off(attitude):
     assert runs_backwards(slave, reversed_master[200:], np.eye(3), 0.0, 0.3) is not attitude
 
 
-@pytest.mark.parametrize("late", some([-60.0, 71.0], [-5.0, 5.0, 30.0]))
+@pytest.mark.parametrize("late", some([-60.0], [-5.0, 5.0, 30.0, 71.0]))
 def test_clocks_that_are_off_by_minutes_are_brought_together(late):
     inputs, truth = BENCHES["attitude"].draw(9131, 0)
     slave, master = inputs["record"], inputs["master"].shifted(late)

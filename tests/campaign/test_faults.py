@@ -1,5 +1,6 @@
 """Faults of drawn sizes: those that passed in silence once are flagged, or harmless; sound logs are left alone."""
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -62,7 +63,16 @@ def test_a_sound_log_is_left_alone(procedure):
 @pytest.mark.parametrize("procedure", BENCHES)
 def test_the_whole_campaign(procedure):
     """Ten draws of every fault: silent are those alone that a log cannot show."""
-    assert silent(run_faults([procedure], runs=10, seed=SEED + 1)) == []
+    assert silent(run_faults([procedure], runs=10, seed=SEED + 1, workers=os.cpu_count())) == []
+
+
+@pytest.mark.slow
+def test_workers_find_what_one_process_finds():
+    asked = (["unspecified", "still"], [SOUND, "gyro sign", "dead sensor"])
+    kept = []
+    alone, shared = (run_faults(*asked, runs=2, seed=SEED, workers=count, keep=kept.append) for count in (1, 2))
+    assert [repr(trial) for trial in shared] == [repr(trial) for trial in alone]  # a worst that is no number
+    assert sorted(map(repr, kept[len(alone) :])) == sorted(map(repr, alone))
 
 
 @pytest.mark.slow
@@ -261,6 +271,8 @@ def test_names_that_are_not_known():
         run_faults(["flying"])
     with pytest.raises(UsageError, match="fault 'rust'"):
         run_faults(faults=["rust"])
+    with pytest.raises(UsageError, match="workers 0"):
+        run_faults(workers=0)
 
 
 def test_the_table_counts():

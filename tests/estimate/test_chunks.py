@@ -23,7 +23,7 @@ from truenorth.state.layout import STATES
 from truenorth.state.state import Start, State
 from truenorth.strapdown.increments import ImuRows
 
-SECONDS, RATE = 40.0, 50.0
+SECONDS, RATE = 24.0, 50.0
 
 
 def some(source, rows):

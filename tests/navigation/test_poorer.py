@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.runs import few_and_all
+from tests.runs import few_and_all, some
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.estimate.poorer import FACTORS, KINDS, poorer, poorer_rivals
@@ -52,13 +52,13 @@ def test_a_sound_drive_is_left_alone(runs):
         assert not _asked(result)
 
 
-@few_and_all(8, few=2)
+@few_and_all(8, few=1)
 @pytest.mark.parametrize(
     ("wrong", "key"),
-    [
-        (0.05 * np.eye(3), "rival.scale_factors"),
-        (0.02 * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), "rival.misalignments"),
-    ],
+    some(
+        [(0.05 * np.eye(3), "rival.scale_factors")],
+        [(0.02 * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), "rival.misalignments")],
+    ),
 )
 def test_gyros_that_are_poorer_than_said_in_one_thing_are_found(wrong, key, runs):
     """Contradicted, or in sigma; and what to check is the specification.

@@ -1,6 +1,7 @@
 """Rows of two sensors in turn are found, with what their mean is turned by; vibration and coarse counters do not alternate."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -69,12 +70,17 @@ def test_of_one_in_four_every_second_row_differs(degrees):
     assert found.effect.level == pytest.approx(np.radians(degrees) / 4.0, rel=0.06)
 
 
+@cache
+def drawn(procedure, run):
+    return BENCHES[procedure].draw(771240, run)[0]["record"]
+
+
 @pytest.mark.parametrize("period", [3, 5])
 @pytest.mark.parametrize("procedure", ["still", "swaying", "rotary", "gnss", "odometer", "transfer", "attitude"])
 def test_one_in_so_many_is_found_on_every_procedure(procedure, period):
     """Once silent: of one in three twelve of twelve, by 7 to 84 sigmas, of one in five 33 of 40, by 3 to 156."""
     for run in (0, 2):
-        record = BENCHES[procedure].draw(771240, run)[0]["record"]
+        record = drawn(procedure, run)
         assert not alternation_evidence(record)
         (found,) = alternation_evidence(two_in_turn(record, np.radians([0.3, 0.2, 0.3]), period))
         assert found.figures["rows"] == period

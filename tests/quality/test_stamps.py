@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.runs import some
 from truenorth.aiding.source import Aiding
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
@@ -51,7 +52,7 @@ def test_a_scatter_is_found_by_its_size():
     assert np.std(found) < 0.025
 
 
-@pytest.mark.parametrize("world", [{}, {"factor": 3.0}, {"factor": 0.5}, {"slow": 0.1}])
+@pytest.mark.parametrize("world", some([{"factor": 3.0}, {"slow": 0.1}], [{}, {"factor": 0.5}]))
 def test_noise_of_another_size_and_errors_that_last_are_no_scatter(world):
     """Beyond a ratio of 10 in less than one of 148 sound logs: of 40 none or one."""
     found = [stamp_scatter(*drive(np.random.default_rng([4, run]), **world), 0.0) for run in range(40)]

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests import recordings
+from tests.runs import some
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, RECEIVER, Bench, misses
 from truenorth.core.earth import earth_rate_n, normal_gravity
@@ -62,7 +63,7 @@ def test_both_errors_are_those_of_the_integration(frequency, rate):
 
 
 @pytest.mark.parametrize("kind", ["rates", "increments"])
-@pytest.mark.parametrize(("frequency", "rate"), [(5.0, 200.0), (17.3, 200.0), (20.0, 100.0)])
+@pytest.mark.parametrize(("frequency", "rate"), some([(5.0, 200.0), (20.0, 100.0)], [(17.3, 200.0)]))
 def test_the_mean_rate_of_a_base_that_trembles_is_short_of_its_turn_by_the_cone(frequency, rate, kind):
     """It comes back to where it was; the mean of its gyros does not."""
     if kind == "rates":

@@ -74,7 +74,7 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
     """
     mapping, left, attempts = plan.to_mapping(), list(blocks), dict.fromkeys(blocks, 0)
     while left:
-        with one_thread_each(), _pool(workers) as pool:
+        with one_thread_each(), pool_of(workers) as pool:
             under_way: dict[Future[Any], Block] = {}
             try:
                 while left or under_way:
@@ -100,7 +100,7 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
     """A pool of spawned processes; on the way out, an interrupt does not wait for the blocks under way."""
     import multiprocessing
 

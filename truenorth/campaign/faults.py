@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
 from functools import cached_property
 from itertools import product
 from typing import Any, Literal, NamedTuple
@@ -12,6 +13,7 @@ from zlib import crc32
 import numpy as np
 
 from truenorth.alignment.result import Alignment
+from truenorth.campaign.execution import one_thread_each, pool_of, uninterrupted
 from truenorth.campaign.fault import Fault
 from truenorth.campaign.fault_aids import AID_FAULTS
 from truenorth.campaign.fault_benches import BENCHES, Bench, misses
@@ -22,6 +24,7 @@ from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.navigation.result import Navigation
 
 Outcome = Literal["refused", "flagged", "harmless", "unseen", "silent", "crash"]
+Pair = tuple[str, int]  # a procedure and the number of its sound log
 FAULTS: tuple[Fault, ...] = (*IMU_FAULTS, *AID_FAULTS)
 SOUND = "none"
 HARMLESS = 3.0  # sigmas
@@ -54,6 +57,7 @@ def run_faults(
     runs: int = 3,
     seed: int = 0,
     done: Sequence[Trial] = (),
+    workers: int = 1,
     keep: Callable[[Trial], None] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> list[Trial]:
@@ -68,36 +72,64 @@ def run_faults(
     seed : int
     done : sequence of Trial
         Of an earlier call: they are taken as they are.
+    workers : int
+        Processes of this machine that share the sound logs, each with all of its faults; the trials are the same. (They are
+        spawned: a script that asks for more than one needs ``if __name__ == "__main__":``.)
     keep : callable, optional
         Called with each new trial.
     progress : callable, optional
-        Called with a word about each pair.
+        Called with a word about each pair; of several workers, about each sound log.
 
     Raises
     ------
     UsageError
-        A name that is not known.
+        A name that is not known; fewer workers than one.
     """
+    if workers < 1:
+        raise UsageError(f"workers {workers}; expected 1 or more")
     known = (SOUND, *(fault.name for fault in FAULTS))
     for what, names, all_of in (("procedure", procedures, tuple(BENCHES)), ("fault", faults, known)):
         for name in names:
             if name not in all_of:
                 raise UsageError(f"{what} {name!r} is not known; choose of {', '.join(all_of)}")
-    had = {(t.procedure, t.fault, t.seed, t.run): t for t in done}
+    found = {(t.procedure, t.fault, t.seed, t.run): t for t in done}
     tell, save = progress or (lambda word: None), keep or (lambda trial: None)
-    result = []
-    for name, run in product(procedures or tuple(BENCHES), range(runs)):
-        draw = None
-        for fault in faults or known:
-            trial = had.get((name, fault, seed, run))
-            if trial is None:
-                draw = draw or _Draw(BENCHES[name], seed, run)
-                tell(f"{name} {run + 1}: {'sound' if fault == SOUND else fault}")
-                trial = draw.trial(fault)
-                if trial is not None:
-                    save(trial)
-            result += [] if trial is None else [trial]
-    return result
+    asked = tuple(faults) or known
+    draws = list(product(procedures or tuple(BENCHES), range(runs)))
+    left = {(name, run): [fault for fault in asked if (name, fault, seed, run) not in found] for name, run in draws}
+    left = {draw: missing for draw, missing in left.items() if missing}
+    for trial in _in_turn(left, seed, tell) if workers == 1 else _by_workers(left, seed, min(workers, len(left)), tell):
+        save(trial)
+        found[trial.procedure, trial.fault, trial.seed, trial.run] = trial
+    keys = ((name, fault, seed, run) for name, run in draws for fault in asked)
+    return [found[key] for key in keys if key in found]
+
+
+def _in_turn(left: Mapping[Pair, Sequence[str]], seed: int, tell: Callable[[str], None]) -> Iterator[Trial]:
+    for (name, run), faults in left.items():
+        draw = _Draw(BENCHES[name], seed, run)
+        for fault in faults:
+            tell(f"{name} {run + 1}: {'sound' if fault == SOUND else fault}")
+            trial = draw.trial(fault)
+            if trial is not None:
+                yield trial
+
+
+def _by_workers(
+    left: Mapping[Pair, Sequence[str]], seed: int, workers: int, tell: Callable[[str], None]
+) -> Iterator[Trial]:
+    with one_thread_each(), pool_of(max(workers, 1)) as pool:
+        with uninterrupted():  # the first task starts the workers
+            under_way = {pool.submit(_of_one, name, run, faults, seed): name for (name, run), faults in left.items()}
+        for future in as_completed(under_way):
+            trials = future.result()
+            tell(f"{under_way[future]}: {len(trials)} trials of a log")
+            yield from trials
+
+
+def _of_one(name: str, run: int, faults: Sequence[str], seed: int) -> list[Trial]:
+    """All faults of one sound log; what runs in a worker."""
+    return list(_in_turn({(name, run): faults}, seed, lambda word: None))
 
 
 def faults_of(inputs: Mapping[str, Any]) -> list[Fault]:

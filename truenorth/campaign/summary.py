@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 RESAMPLES = 1000
+REMEMBERED = 2000  # values, of which the resamplings are kept: 16 MB
 LEVEL = 0.95
 KEYS = ["case", "method", "time_s", "quantity"]
 STATISTICS = ["unit", "runs", "failed", "rms", "mean", "median", "p95", "max", "rms_low", "rms_high"]
@@ -118,12 +120,18 @@ def time_to_converge(table: pd.DataFrame, quantity: str, limit: float) -> pd.Dat
     return pd.DataFrame(result, columns=["case", "method", "run", "time_s"])
 
 
+@lru_cache(maxsize=4)
+def _resampled(size: int) -> NDArray[np.int64]:
+    """(RESAMPLES, size) how often each value is drawn."""
+    rng = np.random.default_rng(size)
+    return rng.multinomial(size, np.full(size, 1 / size), size=RESAMPLES)
+
+
 def bootstrap_rms(values: Array, level: float = LEVEL) -> tuple[float, float]:
     """Percentile interval of the root mean square; the resampling has a seed of its own, so that it repeats."""
     if values.size < 2:
         return math.nan, math.nan
-    rng = np.random.default_rng(values.size)
-    counts = rng.multinomial(values.size, np.full(values.size, 1 / values.size), size=RESAMPLES)
+    counts = (_resampled if values.size <= REMEMBERED else _resampled.__wrapped__)(values.size)
     squares = counts @ values**2 / values.size
     low, high = np.quantile(squares, [0.5 - 0.5 * level, 0.5 + 0.5 * level])
     return math.sqrt(low), math.sqrt(high)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -30,6 +30,7 @@ def faults(
     ] = None,
     runs: Annotated[int, option("Of each procedure with each fault.", min=1, panel="Trials")] = 3,
     seed: Annotated[int, option("Of motions, errors, and sizes of the faults.", min=0, panel="Trials")] = 0,
+    workers: Annotated[int, option("Processes that share the sound logs.", min=1, panel="Trials")] = 1,
     output: Annotated[
         Path | None, option("Folder for trials and tables; trials that it holds are not done again.", "-o", "--output")
     ] = None,
@@ -51,7 +52,8 @@ def faults(
     done = [] if folder is None else read_trials(folder / "trials.csv")
     keep = None if folder is None else keeper(folder / "trials.csv", done)
     with stages(False) as tell:
-        trials = run_faults(procedure or (), fault or (), runs=runs, seed=seed, done=done, keep=keep, progress=tell)
+        how: dict[str, Any] = {"done": done, "workers": workers, "keep": keep, "progress": tell}
+        trials = run_faults(procedure or (), fault or (), runs=runs, seed=seed, **how)
     rows = table(trials)
     console = make_console()
     shown = Table(box=None, pad_edge=False)

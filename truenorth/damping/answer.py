@@ -100,8 +100,13 @@ def even(track: Track) -> Track:
 
 
 def corrected(damped: Track, found: Found, start: int) -> Track:
-    """A track whose errors are taken off, with the bands that are left; correlations are not given."""
-    P, sensors, estimate = damped.P.copy(), damped.sensors.copy(), found.estimate
+    """A track whose errors are taken off, with the bands that are left; correlations are not given.
+
+    The bands take the place of the covariances that they come from: of two days at 1 Hz these are 1 GB.
+    """
+    P, sensors, estimate = damped.P, damped.sensors.copy(), found.estimate
+    if not P.flags.writeable:
+        P = P.copy()
     variance = np.einsum("kii->ki", P)[start:].copy()
     if found.bands is not None:
         sigma = found.bands.errors
@@ -113,8 +118,7 @@ def corrected(damped: Track, found: Found, start: int) -> Track:
             variance[:, there] = estimate.sigma[:, own] ** 2
     variance[:, LEVEL] = sigma**2
     P[start:] = 0.0
-    states = np.arange(P.shape[1])
-    P[start:, states, states] = variance
+    np.einsum("kii->ki", P)[start:] = variance
     return replace(damped, P=P, sensors=sensors)
 
 

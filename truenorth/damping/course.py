@@ -44,8 +44,8 @@ def place_at(course: Track, time: float) -> tuple[float, float, float]:
     return lat + north / (R_M + alt), lon + east / ((R_N + alt) * np.cos(lat)), alt
 
 
-def linearised(course: Track, model: MarineModel) -> tuple[Array, Array]:
-    """``F`` and ``Phi`` (K, n, n) of each interval, about the means of its ends.
+def intervals(course: Track) -> Intervals:
+    """From epoch to epoch, about the means of both ends.
 
     The specific force is what has changed the velocity: ``f = dv/dt + (2 w_ie + w_en) x v - g``; the rate is what has turned the
     attitude, ``w_ib = w_nb + C' (w_ie + w_en)``.
@@ -60,7 +60,12 @@ def linearised(course: Track, model: MarineModel) -> tuple[Array, Array]:
     )
     turn = rotation_vector_from_dcm(np.swapaxes(course.C_nb[:-1], 1, 2) @ course.C_nb[1:])
     w_b = turn / course.interval + np.einsum("kji,kj->ki", C, earth_rate + transport)
-    return model.linearise(Intervals(np.full(len(v), course.interval), C, f, v, lat, alt, w_b))
+    return Intervals(np.full(len(v), course.interval), C, f, v, lat, alt, w_b)
+
+
+def linearised(course: Track, model: MarineModel) -> tuple[Array, Array]:
+    """``F`` and ``Phi`` (K, n, n) of each of its intervals."""
+    return model.linearise(intervals(course))
 
 
 def without_errors(course: Track, x: Array) -> Track:

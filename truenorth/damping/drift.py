@@ -29,6 +29,7 @@ from truenorth.damping.filters import Filter, run_filters
 from truenorth.damping.loop import LONGEST_STEP
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.errors.log import DRIFT, LogErrors
+from truenorth.errors.marine import MOTION
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -70,10 +71,13 @@ def likely_drift(
     every = max(1, round(SMOOTH / coarse.interval))
     sparse[::every] = seen[::every]
 
+    # About what one of them finds: all are compared on the same dynamics, which are worked out once.
+    first = run_filters(coarse, seen, start=0, kinds={"first": kind}, seen=shown)["first"]
+
     def as_likely(rows: Array, base: Filter, pairs: list[Pair], slack: float) -> tuple[list[Pair], float]:
         """Those that are as likely as the likeliest but for `slack`, and how much less likely the least likely one is."""
         kinds = {str(pair): _with(base, *pair) for pair in pairs}
-        found = run_filters(coarse, rows, start=0, kinds=kinds, seen=shown)
+        found = run_filters(coarse, rows, start=0, kinds=kinds, seen=shown, about=first.x[:, MOTION])
 
         def weighed(pair: Pair) -> float:
             doubt = math.log(pair[0] / given.drift) / DOUBT

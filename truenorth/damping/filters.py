@@ -16,22 +16,24 @@ Source: L. Zhao, J. Li, J. Cheng, J. Harbin Inst. Technol. 50 (3), 2018, eq. 2-4
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
-from truenorth.damping.course import linearised, without_errors
+from truenorth.damping.course import intervals, without_errors
 from truenorth.errors.log import log_rows
 from truenorth.errors.marine import DP, DV, MOTION, PHI, STATES, MarineModel
 from truenorth.filters import Estimates, FilterState, LinearSystem, gated, kalman
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
+Linear = tuple[Array | None, Array]  # F, where it is asked for, and Phi of K intervals, (K, n, n)
 
 BLOCK = 3600  # epochs linearised at a time: some 20 MB
 FRESH = 300  # epochs for which a filter that re-linearises does so
@@ -159,8 +161,8 @@ class _Stream:
         self.rows = np.zeros((0, 2, n))
         self.done = 1
 
-    def feed(self, part: Track, z: Array, linear: tuple[Array, Array] | None = None) -> None:
-        """Take the next epochs: K intervals of the course, z (K, 2), F and Phi (K, n, n) where they are known."""
+    def feed(self, part: Track, z: Array, linear: Linear | None = None) -> None:
+        """Take the next epochs: K intervals of the course, z (K, 2), and what it is linear in, where that is known."""
         if self.kind.relinearise and len(z) > FRESH:
             for begin in range(0, len(z), FRESH):
                 end = min(begin + FRESH, len(z))
@@ -174,11 +176,15 @@ class _Stream:
             ahead = last + (last - before if self.done > FRESH else 0.0) / 2.0  # at the middle of these epochs
             known = ahead / 2.0
             part = without_errors(part, known)
-        F, Phi = linearised(part, self.kind.model) if linear is None else linear
+        if linear is None:
+            model, along = self.kind.model, intervals(part)
+            linear = model.linearise(along) if self.lag else (None, model.transitions(along))
+        F, Phi = linear
         n, K = self.kind.model.states, len(Phi)
         if self.lag == 0:
             H = self.kind.rows(part if self.seen is None else without_errors(self.seen[epochs], known))
         else:
+            assert F is not None  # with a window there is
             rows = np.concatenate([self.rows, F[:, DV, :n]])
             total = np.concatenate([np.zeros((1, 2, n)), np.cumsum(rows, axis=0)])
             first = len(self.rows) + 1 + np.arange(K) - self.lag
@@ -300,28 +306,36 @@ def run_filters(
 
     smoothed = np.zeros_like(z)  # filter 1's estimate of dv: what is left of v_INS - v_ref, smoothed
 
-    def run(name: str) -> None:
-        stream = streams[name]
-        for begin in range(start, len(course) - 1, BLOCK):
-            end = min(begin + BLOCK, len(course) - 1)
-            part = course[begin : end + 1]
-            linear = None if stream.kind.relinearise else linearised(part, stream.kind.model)
-            if about is not None:
-                known = about[begin - start : end - start + 1]
-                linear = linearised(without_errors(part, 0.5 * known), stream.kind.model)
-                part = without_errors(part, known)
-            if stream.lag:
-                stream.feed(part, change(z, stream, begin, end, start), linear)
-            else:
-                stream.feed(part, z[begin + 1 : end + 1], linear)
-            if name == "filter1" and "filter2" in streams:
+    def run(begin: int, names: Sequence[str]) -> None:
+        """Some of the filters through one block; those whose models move alike share one matrix."""
+        end = min(begin + BLOCK, len(course) - 1)
+        part = middle = course[begin : end + 1]
+        if about is not None:
+            known = about[begin - start : end - start + 1]
+            part, middle = without_errors(part, known), without_errors(part, 0.5 * known)
+        along = intervals(middle)
+        last: tuple[MarineModel, Array] | None = None
+        for name in names:
+            stream, model, leads = streams[name], streams[name].kind.model, name == "filter1" and "filter2" in streams
+            linear: Linear | None = None
+            if not stream.kind.relinearise and (leads or stream.lag):
+                linear = model.linearise(along)
+            elif not stream.kind.relinearise:
+                last = model, model.transitions(along, last)
+                linear = None, last[1]
+            of = z[begin + 1 : end + 1] if not stream.lag else change(z, stream, begin, end, start)
+            stream.feed(part, of, linear)
+            if leads:
                 two, rows = streams["filter2"], slice(begin + 1, end + 1)
                 smoothed[rows] = stream.x[begin + 1 - start : end + 1 - start, DV]
                 same = two.kind.model == stream.kind.model and not two.kind.relinearise
                 two.feed(part, change(smoothed, two, begin, end, start + settling), linear if same else None)
 
-    with ThreadPoolExecutor(max(workers, 1)) as pool:
-        list(pool.map(run, [name for name in kinds if name != "filter2"]))
+    free = [name for name in kinds if name != "filter2"]
+    shares = [free[i::workers] for i in range(min(max(workers, 1), len(free)))]
+    with ThreadPoolExecutor(len(shares)) as pool:
+        for begin in range(start, len(course) - 1, BLOCK):
+            list(pool.map(partial(run, begin), shares))
     return {name: stream.estimate(start) for name, stream in streams.items()}
 
 

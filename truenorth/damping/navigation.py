@@ -75,7 +75,7 @@ def damp_navigation(
     Parameters
     ----------
     result : Navigation
-        Without aiding, its height held.
+        Without aiding, its height held. Its track's covariances are overwritten by those of the damped one.
     velocity : VelocityLog, optional
         Needed by all methods but ``none`` and ``internal``. Of its mounting, the angles of a log in body axes, its arm and its
         latency.

@@ -23,7 +23,8 @@ Inst. Technol. 50 (3), 2018, eq. 1.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -112,7 +113,7 @@ class MarineModel(Walks):
         """(3,) m/s^2, on what differs from which the accelerometers' axes act."""
         return next(np.array(group.figures[:3]) for group in self.groups if group.name == ins.ACCEL_AXES)
 
-    @property
+    @cached_property
     def dynamics(self) -> Dynamics:
         """How the groups run by themselves."""
         return dynamics_of(self.groups, np.zeros(ins.STATES))
@@ -144,31 +145,71 @@ class MarineModel(Walks):
 
     def linearise(self, along: Intervals) -> tuple[Array, Array]:
         """``F`` and ``Phi``, (K, n, n), of ``x' = F x + w`` and of the transition over each interval."""
-        T, v = along.T, along.v_n
-        decay = np.zeros(ins.STATES)
-        decay[ins.BG], decay[ins.BA] = 1.0 / self.gyro_time, 1.0 / self.accel_time
-        n = self.states
-        F, Phi = np.zeros((len(T), n, n)), np.zeros((len(T), n, n))
-        _stack(padded(ins.STATES), T, along.C_nb, along.f_n, v, along.axis, along.alt, decay, OF_INS, F, Phi)
+        core, Phi = self._moved(along)
+        F = np.zeros(Phi.shape)
+        F[:, :STATES, :STATES] = core
+        behind = np.arange(STATES, self.states)
+        F[:, behind, behind] = -self._rates(along.v_n)
+        for rows, own, effect in self._acting(along):
+            F[:, rows, own] = effect
+        return F, Phi
+
+    def transitions(self, along: Intervals, like: tuple[MarineModel, Array] | None = None) -> Array:
+        """``Phi`` of :meth:`linearise` alone: ``F`` of many states is as large, and filters of the velocity error ask for none.
+
+        Parameters
+        ----------
+        like : MarineModel and array, optional
+            A model and its ``Phi``, which is changed and given back where this model differs in how its groups forget alone.
+        """
+        if like is None or not self._moves_as(like[0]):
+            return self._moved(along)[1]
+        self._forget(along, like[1])
+        return like[1]
+
+    def _moves_as(self, other: MarineModel) -> bool:
+        acting = [[(group.name, len(group.prior), group.figures) for group in model.groups] for model in (self, other)]
+        return acting[0] == acting[1] and replace(self, groups=()) == replace(other, groups=())
+
+    def _forget(self, along: Intervals, Phi: Array) -> None:
+        behind = np.arange(STATES, self.states)
+        Phi[:, behind, behind] = np.exp(-along.T[:, None] * self._rates(along.v_n))
+
+    def _rates(self, v_n: Array) -> Array:
+        """(K, n - 13), 1/s, at which the groups forget."""
         d = self.dynamics
-        rate = d.decay[ins.STATES :] + np.linalg.norm(v[:, :2], axis=1)[:, None] * d.along[ins.STATES :]
-        behind = np.arange(STATES, n)
-        F[:, behind, behind], Phi[:, behind, behind] = -rate, np.exp(-T[:, None] * rate)
-        deflected = self.slice_of(DEFLECTION)
+        speed = np.linalg.norm(v_n[:, :2], axis=1)
+        return np.asarray(d.decay[ins.STATES :] + speed[:, None] * d.along[ins.STATES :])
+
+    def _acting(self, along: Intervals) -> list[tuple[slice, slice, Array]]:
+        """Rows, columns and (K, rows, columns) elements of ``F`` by which groups act on the INS."""
+        found = []
+        deflected, gyros, accels = map(self.slice_of, (DEFLECTION, ins.GYRO_AXES, ins.ACCEL_AXES))
         if deflected is not None:
-            F[:, DV, deflected] = STANDARD_GRAVITY * np.eye(2)
-            Phi[:, DV, deflected] = T[:, None, None] * F[:, DV, deflected]
-            Phi[:, DP, deflected] = 0.5 * T[:, None, None] * Phi[:, DV, deflected]
-        gyros, accels = self.slice_of(ins.GYRO_AXES), self.slice_of(ins.ACCEL_AXES)
-        if gyros is not None:  # phi' = -C M w; the tilt of a turn drives velocity by F
-            F[:, PHI, gyros] = -(along.C_nb[:, :, :, None] * along.w_ib_b[:, None, None, :]).reshape(len(T), 3, 9)
-            Phi[:, PHI, gyros] = T[:, None, None] * F[:, PHI, gyros]
-            Phi[:, DV, gyros] = 0.5 * T[:, None, None] * (F[:, DV, PHI] @ Phi[:, PHI, gyros])
+            found.append((DV, deflected, np.broadcast_to(STANDARD_GRAVITY * np.eye(2), (len(along.T), 2, 2))))
+        if gyros is not None:  # phi' = -C M w
+            turned = -(along.C_nb[:, :, :, None] * along.w_ib_b[:, None, None, :]).reshape(len(along.T), 3, 9)
+            found.append((PHI, gyros, turned))
         if accels is not None:  # dv' = C M (f - f0)
             f_b = np.einsum("kji,kj->ki", along.C_nb, along.f_n) - self._standing
-            F[:, DV, accels] = (along.C_nb[:, :2, :, None] * f_b[:, None, None, :]).reshape(len(T), 2, 9)
-            Phi[:, DV, accels] = T[:, None, None] * F[:, DV, accels]
-            Phi[:, DP, accels] = 0.5 * T[:, None, None] * Phi[:, DV, accels]
+            pushed = (along.C_nb[:, :2, :, None] * f_b[:, None, None, :]).reshape(len(along.T), 2, 9)
+            found.append((DV, accels, pushed))
+        return found
+
+    def _moved(self, along: Intervals) -> tuple[Array, Array]:
+        """``F`` of the thirteen states, (K, 13, 13), and ``Phi``, (K, n, n)."""
+        T, v, n = along.T, along.v_n, self.states
+        decay = np.zeros(ins.STATES)
+        decay[ins.BG], decay[ins.BA] = 1.0 / self.gyro_time, 1.0 / self.accel_time
+        F, Phi = np.zeros((len(T), STATES, STATES)), np.zeros((len(T), n, n))
+        _stack(padded(ins.STATES), T, along.C_nb, along.f_n, v, along.axis, along.alt, decay, OF_INS, F, Phi)
+        self._forget(along, Phi)
+        for rows, own, effect in self._acting(along):
+            Phi[:, rows, own] = T[:, None, None] * effect
+            if rows == PHI:  # the tilt of a turn drives velocity
+                Phi[:, DV, own] = 0.5 * T[:, None, None] * (F[:, DV, PHI] @ Phi[:, PHI, own])
+            else:
+                Phi[:, DP, own] = 0.5 * T[:, None, None] * Phi[:, DV, own]
         return F, Phi
 
 
