@@ -142,6 +142,19 @@ def test_increments_that_differ_in_their_last_digits_are_one_quantum():
         assert ("saturated" in codes(inspect(ImuRecord(record.time, gyro, record.accel, "increments")))) == found
 
 
+def test_a_channel_that_is_stuck_for_long_is_no_coarse_sensor():
+    """Of a log on the move: an eighth of it, in which the steadiest tenth lies. A coarse gyro that rests as long is left alone."""
+    record = base(duration=60.0)
+    t = record.time - record.time[0]
+    driven = 0.2 * np.sin(0.5 * t) * (t < 50.0)
+    gyro = record.gyro + driven[:, None] * [0.0, 0.0, 1.0]
+    stuck = gyro.copy()
+    stuck[t > 52.0, 2] = gyro[t > 52.0, 2][0]
+    step = 20.0 * np.std(np.diff(record.gyro[:, 2]))
+    for found, values in ((False, gyro), (True, stuck), (False, step * np.round(gyro / step))):
+        assert ("frozen" in codes(inspect(ImuRecord(record.time, values, record.accel)))) == found
+
+
 def test_saturation():
     record = base(amplitude=(10.0, 10.0, 5.0))
     limit = np.radians(8.0)

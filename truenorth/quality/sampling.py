@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truenorth.core.remembered import remembered
 from truenorth.quality.again import Again, rows_again
 from truenorth.quality.packets import exchanged_packets
+from truenorth.quality.stuck import stands_alone
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.limits import limit
 
@@ -213,7 +214,9 @@ def _frozen(
     for channel, name in enumerate(COLUMNS[record.kind]):
         runs[channel], first = _longest_run(same[channel])
         at[channel] = first
-        most = max(10.0, FROZEN_TIME / record.interval, limit("frozen") * by_chance[channel])
+        least = max(10.0, FROZEN_TIME / record.interval)
+        alone = runs[channel] > least and stands_alone(data, same, channel, first, int(runs[channel]))
+        most = least if alone else max(least, limit("frozen") * by_chance[channel])
         if runs[channel] == len(record):
             dead = _is_dead(data, channel)
             # Where the other sensor has noise, no simulation without noise made the log.
@@ -227,7 +230,7 @@ def _frozen(
                 )
             )
         elif runs[channel] > most and (
-            chance[channel] < limit("coarse") or _loses(data[channel], first, int(runs[channel]))
+            alone or chance[channel] < limit("coarse") or _loses(data[channel], first, int(runs[channel]))
         ):
             findings.append(
                 Finding(
