@@ -38,8 +38,8 @@ from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
-from truenorth.estimate.poorer import poorer_evidence
-from truenorth.estimate.rivals import jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
+from truenorth.estimate.poorer import ALONE, poorer_evidence, poorer_rivals, poorer_tracks
+from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
@@ -294,9 +294,17 @@ def _seen(
     again = partial(_of_model, task, guess, gated)
     without = [partial(_of_model, less, guess, gated) for less in task.without_slow_errors()]
     found += noise_evidence(again, track, task.model, task.record)
-    found += poorer_evidence(lambda spec: task.with_spec(spec).run(guess, gated=gated), track, task.spec)
-    warming = partial(warming_rivals, other, track, task.record, task.spec)
-    return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration, without, warming)
+
+    def of_another_imu(spec: ImuSpec) -> Track:
+        return task.with_spec(spec).run(guess, gated=gated)
+
+    def of_another_course() -> list[Rival]:
+        warming = warming_rivals(other, track, task.record, task.spec)
+        return warming + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, ALONE))
+
+    found += poorer_evidence(of_another_imu, track, task.spec)
+    span = task.record.duration
+    return found + wandering_evidence(again, track, task.model, task.spec, span, without, of_another_course)
 
 
 def _of_model(task: MovingTask, guess: Guess, gated: bool, model: InsModel) -> Track:
