@@ -235,11 +235,12 @@ def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTa
 
     Noise in turns besides states of the axes is the same error twice. It carries the first passes, of which nobody knows yet
     whether the axes are constants; heading of a vehicle that turns all the time had three times its sigma by it. A log whose wheel
-    or velocity log has shown slow errors that nobody spoke of is not as specified: these turn with the vehicle, and may hide what
-    the axes do. Those of a receiver do not turn with it.
+    or velocity log has shown slow errors across its way that nobody spoke of is not as specified: these turn with the vehicle, and
+    hide what the axes do, as a wrong heading turns velocity across. Those of a receiver do not turn with it.
     """
     constant = task.with_constant_axes()
-    if constant is task or task.lasting.keys() - {FIXES, SPEEDS}:
+    hidden = any(slow.across for name, slow in task.lasting.items() if name not in (FIXES, SPEEDS))
+    if constant is task or hidden:
         return task, found
     other = found
     for number in range(MORE_PASSES):
