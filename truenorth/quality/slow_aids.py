@@ -11,6 +11,7 @@ to hours, multipath for a minute.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -101,9 +102,9 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
         seen = _wander(residuals, kind.axes)
         if seen is None:
             continue
-        correlation, size = seen
+        correlation, size, of_rows = seen
         sigma = FOLLOWED * size
-        if sigma.max() > kind.most:
+        if max(sigma.max(), FOLLOWED * of_rows) > kind.most:
             continue
         sigma = np.maximum(sigma, LEAST * sigma.max())
         found[source.name] = Lasting(Group(kind.name, sigma, kind.time, unit=residuals.unit))
@@ -117,8 +118,11 @@ def wanders(name: str, correlation: float, size: float, unit: str) -> Evidence:
     return Evidence("innovations.wander", figures)
 
 
-def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
-    """Mean correlation over the first lags, and the root of what rows that follow each other have in common; None: chance."""
+def _wander(residuals: Residuals, axes: int) -> tuple[float, Array, float] | None:
+    """Mean correlation over the first lags, and the root of what means that follow each other have in common; None: chance.
+
+    The last is the largest of what rows have in common: a clock that is late shows in them, and not in means over its changes.
+    """
     rows = residuals.rows > 0
     e, sigma = residuals.innovation[rows, :axes], residuals.sigma[rows, :axes]
     there = np.isfinite(e).all(axis=0)  # heights are left out where height is held
@@ -127,7 +131,9 @@ def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
         return None
     # Rows that were rejected may be the slow error itself; outliers count as its largest.
     most = MOST * np.median(np.abs(e), axis=0)
-    e, sigma = _means(residuals.time[rows], np.clip(e, -most, most), sigma)
+    e = np.clip(e, -most, most)
+    of_rows = math.sqrt(max(float(_alike(e).max()) / len(e), 0.0))
+    e, sigma = _means(residuals.time[rows], e, sigma)
     if len(e) < LEAST_ROWS:
         return None
     # Axis by axis, too: a wheel's constraints are mostly far better kept than sigma says, and would hide its slip.
@@ -137,13 +143,18 @@ def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
     larger = np.array([own.size * own.colour > 1.0 for own in each])
     if not larger.any():
         return None
-    alike = larger * np.mean([np.sum(e[lag:] * e[:-lag], axis=0) for lag in range(1, LAGS + 1)], axis=0)
+    alike = larger * _alike(e)
     correlation = float(np.mean((alike / np.sum(e**2, axis=0))[larger]))
     if correlation <= 0.0 or alike.max() <= 0.0:
         return None
     size = np.zeros(axes)
     size[there] = np.sqrt(np.maximum(alike, 0.0) / len(e))
-    return correlation, size
+    return correlation, size, of_rows
+
+
+def _alike(e: Array) -> Array:
+    """(m,) sums of products of rows (M, m) that follow each other, the mean of the first lags."""
+    return np.asarray(np.mean([np.sum(e[lag:] * e[:-lag], axis=0) for lag in range(1, LAGS + 1)], axis=0))
 
 
 def _means(time: Array, e: Array, sigma: Array) -> tuple[Array, Array]:
