@@ -10,7 +10,8 @@ from benchmarks.honesty import moving
 from benchmarks.honesty.harness import Log, simulated
 from tests.alignment.test_in_motion_learnt import track_of
 from truenorth.alignment import in_motion
-from truenorth.quality.slow_aids import FIXES, SPEEDS
+from truenorth.errors.group import Group
+from truenorth.quality.slow_aids import FIXES, LEAST, SPEEDS, Lasting
 
 SEED = 61  # any
 
@@ -66,16 +67,30 @@ def test_axes_of_gyros_that_change_are_noise_in_turns(monkeypatch, turning):
     assert max(task.model.turn_noise) > 0.0
 
 
+ALONG, ALL = (LEAST, 1.0, LEAST), (1.0, 1.0, 1.0)
+
+
 @pytest.mark.parametrize(
-    ("name", "steady"), [(FIXES, True), (SPEEDS, True), ("odometer", False), ("velocity log", False)]
+    ("name", "sizes", "steady"),
+    [
+        (FIXES, ALL, True),
+        (SPEEDS, ALL, True),
+        ("odometer", ALL, False),
+        ("odometer", ALONG, True),
+        ("velocity log", ALL, False),
+    ],
 )
-def test_slow_errors_of_a_receiver_hide_no_axes(monkeypatch, name, steady):
-    """They do not turn with the vehicle; a wheel's slip does. With fixes that wander, three quarters of heading's variance was
-    noise in turns that its states count already."""
+def test_slow_errors_of_a_receiver_hide_no_axes_nor_does_what_a_wheel_slips_along_its_way(
+    monkeypatch, name, sizes, steady
+):
+    """They do not turn with the vehicle; a slip sideways does, and looks as a wrong heading does. With fixes that wander, three
+    quarters of heading's variance was noise in turns that its states count already."""
     one = np.ones((400, 3))
     found = SimpleNamespace(track=track_of(one, one), settled=True)
     constant = SimpleNamespace(steady=True)
-    task = SimpleNamespace(steady=False, lasting={name: None}, with_constant_axes=lambda: constant)
+    task = SimpleNamespace(
+        steady=False, lasting={name: Lasting(Group("slow", np.array(sizes)))}, with_constant_axes=lambda: constant
+    )
     monkeypatch.setattr(in_motion, "once_more", lambda task, before, first: found)
     assert in_motion._as_specified(task, found, None)[0].steady is steady
 

@@ -7,9 +7,13 @@ import pytest
 
 from truenorth import Gnss, align, navigate
 from truenorth.aiding.aids import ANTENNA, VEHICLE_ARM
+from truenorth.alignment.in_motion_task import moving_task
 from truenorth.core.attitude import misalignment
 from truenorth.core.earth import radii
+from truenorth.core.position import Position
 from truenorth.estimate.latency import mounting_found
+from truenorth.simulation import rest, simulate, simulate_sensor
+from truenorth.simulation.gnss import GnssSpec
 from truenorth.simulation.scenario import read_scenario
 from truenorth.state.layout import DP, Layout
 from truenorth.state.mounting import LONGEST_ARM, Mounting
@@ -34,11 +38,26 @@ def test_an_arm_beyond_its_prior_widens_it_before_a_delay_takes_its_place():
     assert mounting_found(said, far, "GNSS").lever_arm_sigma == said.lever_arm_sigma
 
 
+def test_a_place_by_a_fix_is_known_as_well_as_the_arm():
+    """Of an antenna 60 m away the IMU is 60 m from its fix, whichever way; a place that is given is the IMU's own."""
+    way = rest(Position.from_degrees(45.0, 10.0), 0.3)
+    record = simulate(way, rate=20.0, duration=20.0, imu="tactical", seed=1).record
+    gnss = simulate_sensor(way, GnssSpec(), duration=20.0, seed=1).record
+
+    def task(antenna, place=None):
+        return moving_task(record, "tactical", None, gnss, place, None, antenna, (), True, None, 0.0)
+
+    for antenna in (Mounting(lever_arm_sigma=60.0), Mounting(lever_arm=np.array([0.0, 60.0, 0.0]))):
+        begin = task(antenna).begin
+        assert min(begin.horizontal_sigma, begin.vertical_sigma) > 60.0
+        assert task(antenna, Position.from_degrees(45.0, 10.0, horizontal_sigma=2.0)).begin.horizontal_sigma == 2.0
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("arm", [1.0, 15.0, 30.0])
+@pytest.mark.parametrize("arm", [1.0, 15.0, 30.0, 60.0])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_ship_whose_antenna_is_far_ahead(arm, seed):
-    """Of 15 m the place was 4 to 6 sigmas off, with a receiver taken to be 2.5 s early; logs with 30 m were refused."""
+    """Of 15 m the place was 4 to 6 sigmas off, with a receiver taken to be 2.5 s early; of 30 and 60 m logs were refused."""
     straight = {"kind": "straight", "duration": "60 s"}
     legs = [straight]
     for angle in (60, -90, 120, -60):

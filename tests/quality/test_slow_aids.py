@@ -81,3 +81,19 @@ def test_heights_that_are_left_out_say_nothing():
     e[:, 2] = np.nan
     found, _ = seen("GNSS position", e, 0.5)
     assert found["GNSS position"].group.sigma[2] < 1e-2 * found["GNSS position"].group.sigma[0]
+
+
+@pytest.mark.parametrize(("slip", "found"), [(0.03, True), (0.0, False)])
+def test_rounded_pulses_hide_no_slip_and_constraints_that_are_kept_neither(slip, found):
+    """What a row counts too little the next counts too much; sideways a wheel errs by a tenth of what sigma says."""
+    pulse, sigma = 0.03, 0.08
+    states = state("odometer", "scale", 0.03) | state("odometer", "mounting", np.full(2, 0.05))
+    for seed in range(20):
+        rng = np.random.default_rng([9, seed])
+        e = 0.1 * sigma * rng.standard_normal((ROWS, 3))
+        e[:, 1] = np.diff(pulse * rng.random(ROWS + 1)) / INTERVAL + markov(rng, slip, 5.0, 1)[:, 0]
+        shown, _ = seen("odometer", e, sigma, states)
+        assert ("odometer" in shown) == found
+        if found:
+            assert 0.5 * slip < shown["odometer"].group.sigma[1] < 4.0 * slip
+            assert not shown["odometer"].across

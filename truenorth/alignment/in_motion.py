@@ -38,8 +38,8 @@ from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
-from truenorth.estimate.poorer import poorer_evidence
-from truenorth.estimate.rivals import jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
+from truenorth.estimate.poorer import ALONE, poorer_evidence, poorer_rivals, poorer_tracks
+from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
@@ -235,11 +235,12 @@ def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTa
 
     Noise in turns besides states of the axes is the same error twice. It carries the first passes, of which nobody knows yet
     whether the axes are constants; heading of a vehicle that turns all the time had three times its sigma by it. A log whose wheel
-    or velocity log has shown slow errors that nobody spoke of is not as specified: these turn with the vehicle, and may hide what
-    the axes do. Those of a receiver do not turn with it.
+    or velocity log has shown slow errors across its way that nobody spoke of is not as specified: these turn with the vehicle, and
+    hide what the axes do, as a wrong heading turns velocity across. Those of a receiver do not turn with it.
     """
     constant = task.with_constant_axes()
-    if constant is task or task.lasting.keys() - {FIXES, SPEEDS}:
+    hidden = any(slow.across for name, slow in task.lasting.items() if name not in (FIXES, SPEEDS))
+    if constant is task or hidden:
         return task, found
     other = found
     for number in range(MORE_PASSES):
@@ -294,9 +295,17 @@ def _seen(
     again = partial(_of_model, task, guess, gated)
     without = [partial(_of_model, less, guess, gated) for less in task.without_slow_errors()]
     found += noise_evidence(again, track, task.model, task.record)
-    found += poorer_evidence(lambda spec: task.with_spec(spec).run(guess, gated=gated), track, task.spec)
-    warming = partial(warming_rivals, other, track, task.record, task.spec)
-    return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration, without, warming)
+
+    def of_another_imu(spec: ImuSpec) -> Track:
+        return task.with_spec(spec).run(guess, gated=gated)
+
+    def of_another_course() -> list[Rival]:
+        warming = warming_rivals(other, track, task.record, task.spec)
+        return warming + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, ALONE))
+
+    found += poorer_evidence(of_another_imu, track, task.spec)
+    span = task.record.duration
+    return found + wandering_evidence(again, track, task.model, task.spec, span, without, of_another_course)
 
 
 def _of_model(task: MovingTask, guess: Guess, gated: bool, model: InsModel) -> Track:

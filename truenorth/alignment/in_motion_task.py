@@ -93,6 +93,7 @@ class MovingTask:
     # Scale factors and misalignments of the gyros are the constants that the specification says; else noise in turns besides
     steady: bool = False
     held: bool = False  # biases of the accelerometers across the vertical are taken for zero
+    by_fix: bool = False  # the position is that of a fix: the IMU's but for the antenna's arm
     sprung: bool = False  # the body goes up and down on its wheels: they do not say that it stays on the road
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
@@ -166,9 +167,7 @@ class MovingTask:
         """One pass from a guess of the attitude at the start."""
         record = self.record if until is None else self.record.between(self.record.time[0], until)
         used = self.aiding(gated=gated)
-        start = start_at(
-            self.record, guess, self.position, self.spec, self.odometer, self.gnss, self.wheel, self.antenna
-        )
+        start = start_at(self.record, guess, self.begin, self.spec, self.odometer, self.gnss, self.wheel, self.antenna)
         if self.held:
             up = start.C_nb[2]
             P = start.P.copy()
@@ -183,6 +182,18 @@ class MovingTask:
             every=max(1, round(OUTPUT / INTERVAL)),
             invariant=self.odometer is not None,
         )
+
+    @property
+    def begin(self) -> Position:
+        """Where the IMU begins: by a fix as well as the antenna's arm is known, which may point anywhere.
+
+        A prior that is narrower bends an arm of 60 m to 10, until the first turn shows it by what looks like a receiver led away.
+        """
+        if not self.by_fix:
+            return self.position
+        sigma = math.hypot(*self.antenna.lever_arm, self.antenna.lever_arm_sigma)
+        far, high = (math.hypot(own, sigma) for own in (self.position.horizontal_sigma, self.position.vertical_sigma))
+        return replace(self.position, horizontal_sigma=far, vertical_sigma=high)
 
     def by_the_earth(self) -> Guess:
         """Coarse alignment."""
@@ -219,6 +230,7 @@ def moving_task(
     if waited and position is not None:
         far = math.hypot(position.horizontal_sigma, USUAL_SPEED * waited)
         position = None if has_fixes(gnss) else replace(position, horizontal_sigma=far)
+    by_fix = position is None and has_fixes(gnss)
     if position is None:
         position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
@@ -241,6 +253,7 @@ def moving_task(
         more,
         waited=waited,
         usual_fixes=antenna is None,
+        by_fix=by_fix,
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.earth import radii
+from truenorth.errors.axes import standing
 from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 
 if TYPE_CHECKING:
@@ -71,6 +72,8 @@ class Moving:
         The IMU's scale factors and misalignments (:mod:`truenorth.errors.axes`), and an antenna's arm of which nothing was said,
         where they were estimated. A push on an accelerometer that is askew looks like a tilt, and an arm hides a place: both are
         known together.
+    force : (3,) array, m/s^2
+        Specific force at rest, body axes: the accelerometers' axes of `known` act on what differs from it.
     """
 
     v_n: Array
@@ -84,6 +87,7 @@ class Moving:
     track: Track
     delays: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     known: Mapping[str, Array] = field(default_factory=dict)
+    force: Array = field(default_factory=standing)
 
     def less_sure(self, heading: float, level: float = 0.0, velocity: float = 1.0, position: float = 1.0) -> Moving:
         """The same state with these variances (rad^2) added to heading and level, and sigmas so many times as large."""
@@ -173,6 +177,19 @@ def fifteen(track: Track, *others: slice) -> Array:
     return np.asarray(M @ track.P @ M.T)
 
 
+def handed_on(track: Track, groups: Sequence[str] = (GYRO_AXES, ACCEL_AXES)) -> tuple[Array, dict[str, Array]]:
+    """What navigation goes on with at the end of a track: covariance of the fifteen and of groups behind them, their values.
+
+    Parameters
+    ----------
+    groups : sequence of str
+        Those to be handed on, where the track has them.
+    """
+    found = {name: track.layout.slice_of(name) for name in groups}
+    there = {name: own for name, own in found.items() if own is not None}
+    return fifteen(track[-1:], *there.values())[0], {name: track.sensors[-1, own] for name, own in there.items()}
+
+
 def wheel_of(track: Track, sensor: str, C_mb: Array, lever_arm: Array) -> Wheel:
     """How the wheel (or the log) sits after a track, from what was assumed."""
     layout, sensors, sigma = track.layout, track.sensors[-1], track.sigma[-1]
@@ -207,9 +224,7 @@ def moving_of(
     groups : sequence of str
         Those to be handed on, where the track has them.
     """
-    found = {name: track.layout.slice_of(name) for name in groups}
-    there = {name: own for name, own in found.items() if own is not None}
-    P, C_nb = fifteen(track[-1:], *there.values())[0], track.C_nb[-1]
+    (P, known), C_nb = handed_on(track, groups), track.C_nb[-1]
     wheel = None if mounting is None else wheel_of(track, *mounting)
     C_mb = np.eye(3) if wheel is None else wheel.C_mb
     forward = C_nb @ C_mb[1]
@@ -231,5 +246,5 @@ def moving_of(
         vehicle_heading=float(np.arctan2(forward[0], forward[1]) % (2.0 * np.pi)),
         vehicle_heading_sigma=float(np.sqrt(variance)),
         track=track,
-        known={name: track.sensors[-1, own] for name, own in there.items()},
+        known=known,
     )

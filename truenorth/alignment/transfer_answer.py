@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Matched
+from truenorth.alignment.moving import handed_on
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.transfer_filter import Assumed, axes_along
 from truenorth.alignment.transfer_nominal import final_attitudes
@@ -26,13 +27,14 @@ from truenorth.core.attitude import (
     rotation_vector_from_dcm,
 )
 from truenorth.core.position import Position
+from truenorth.errors.axes import standing
 from truenorth.errors.master import ARM, ATTITUDE_ERROR, DELAY, MOUNTING, VELOCITY_ERROR, MasterErrors, TransferModel
 from truenorth.estimate.memory import REJECTED, REOPENED, USED
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.layout import BA, BG, DP, DV, PHI
 from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
@@ -144,6 +146,7 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
     verdict = said.verdict[:, np.array([what.translation is not None, what.attitude])]
     fitted = dict.fromkeys(("velocity", "position", "acceleration"), math.nan)
     fitted[what.kind] = noise[0] if np.isfinite(noise[0]) else math.nan
+    P, known = handed_on(track)
     return Transfer(
         matching=what.name,
         delay=assumed.delay + (0.0 if tau is None else float(aux[tau][0])),
@@ -160,7 +163,7 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
         used=int(np.sum(np.any((verdict == USED) | (verdict == REOPENED), axis=1))),
         rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
-        P=_fifteen(track.P[-1], Position(0.0), carried),
+        P=_placed(P, Position(0.0), carried),
         relative_sigma=_relative(track, model),
         considered=any(model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR)),
         jumps=_jumps(track, said, what),
@@ -170,6 +173,8 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
         acceleration_noise=fitted["acceleration"],
         residuals=track.residuals,
         course=_course(model, assumed, track),
+        known=known,
+        force=standing(assumed.C_mb),
     )
 
 
@@ -211,9 +216,9 @@ def _relative(track: Track, model: TransferModel) -> Array:
     return euler_sigma(track.C_nb[-1], J @ P @ J.T)
 
 
-def _fifteen(P: Array, place: Position, carried: float) -> Array:
-    """(15, 15) covariance as navigation takes it, the place as uncertain as `place` says by default."""
-    result = P[:STATES, :STATES].copy()
+def _placed(P: Array, place: Position, carried: float) -> Array:
+    """(15 + m, 15 + m) covariance as navigation takes it, the place as uncertain as `place` says by default."""
+    result = P.copy()
     result[DV, DV] += carried**2 * np.eye(3)
     result[DP, :], result[:, DP] = 0.0, 0.0
     result[DP, DP] = np.diag(np.square([place.horizontal_sigma, place.horizontal_sigma, place.vertical_sigma]))

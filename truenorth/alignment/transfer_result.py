@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.axes import standing
 from truenorth.state.limits import is_estimated
 from truenorth.state.track import Residuals
 
@@ -48,8 +50,9 @@ class Transfer:
         Rows of the master.
     v_n : (3,) array, m/s
         Of the slave at the alignment's epoch.
-    P : (15, 15) array
-        Covariance of phi, dv, dp, gyro and accelerometer bias there (:mod:`truenorth.errors.ins`): what navigation begins with.
+    P : (15 + m, 15 + m) array
+        Covariance of phi, dv, dp, gyro and accelerometer bias there (:mod:`truenorth.errors.ins`), and of `known` behind them: what
+        navigation begins with.
     relative_sigma : (3,) array, rad
         Of heading, pitch and roll against the master's solution, where its own errors are considered; else as the absolute ones.
     considered : bool
@@ -64,6 +67,10 @@ class Transfer:
         Of the master's rows, source by source.
     course : Relation or None
         Delay, lever arm and mounting on the way.
+    known : mapping of name to (m,) values
+        The slave's scale factors and misalignments (:mod:`truenorth.errors.axes`), where they were estimated.
+    force : (3,) array, m/s^2
+        Specific force at rest, slave axes: the accelerometers' axes of `known` act on what differs from it.
     """
 
     matching: str
@@ -91,6 +98,8 @@ class Transfer:
     acceleration_noise: float = math.nan
     residuals: tuple[Residuals, ...] = ()
     course: Relation | None = None
+    known: Mapping[str, Array] = field(default_factory=dict)
+    force: Array = field(default_factory=standing)
 
     @property
     def delay_estimated(self) -> bool:

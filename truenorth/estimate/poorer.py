@@ -3,29 +3,45 @@
 A specification that is too good makes a filter follow its gyros where it should follow the measurements. Sensors of a poorer class
 have larger errors of all kinds: noise, biases, scale factors and misalignments. But one whose scale factor alone is poor is no
 sensor of a poorer class, whose noise the log rules out: scale factors and misalignments are made larger each alone, too.
+
+A log may prefer the true sensors by less than chance explains, and its answer be five sigmas off all the same. So what is unsure is
+in sigma. Let each of them be as likely beforehand as makes it as likely as not at the limit c of a rival, one to 148. With r, twice
+the logarithms of the likelihood ratios, the chance of each and the second moment of the errors about the specification's answer are
+
+    w_i = exp((r_i - c) / 2) / (1 + sum exp((r_j - c) / 2)),        P + sum w_i (P_i - P + d_i d_i')
+
+d the way from one answer to the other.
+
+Source: Y. Bar-Shalom, X. Li, T. Kirubarajan, *Estimation with Applications to Tracking and Navigation* (2001), sec. 1.4.16
+(moments of a mixture), 11.6 (multiple models).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.estimate.rivals import Rival, effect_of, likelihood_ratio, moved, rival
+from truenorth.estimate.rivals import Rival, effect_of, last_sizes, likelihood_ratio, moved, nearest, rival
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
+from truenorth.state.judge import weight
 from truenorth.state.limits import limit
 from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
 
 FACTORS = (3.0, 10.0, 30.0, 100.0)  # classes of IMUs lie up to a hundred times apart
 FIELDS = ("bias", "turn_on_bias", "random_walk", "bias_instability", "rate_random_walk", "scale_factor", "misalignment")
 # What may be poorer than specified. On a sound log each fits better than chance explains in 3 of 10,000 at most: of three states of
 # the prior that a log shows whole, ``(1 - 1/9) chi_3^2 - 6 ln 3`` exceeds 10; of fewer, of more and of larger factors more seldom.
-KINDS = {
-    "rival.poorer": FIELDS,
-    "rival.scale_factors": ("scale_factor", "scale_factor_asymmetry"),
-    "rival.misalignments": ("misalignment",),
-}
+ALONE = {"rival.scale_factors": ("scale_factor", "scale_factor_asymmetry"), "rival.misalignments": ("misalignment",)}
+KINDS = {"rival.poorer": FIELDS, **ALONE}
 
 
 def poorer(spec: ImuSpec, factor: float, fields: Sequence[str] = FIELDS) -> ImuSpec:
@@ -55,24 +71,66 @@ def poorer_evidence(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec
     return sorted(found, key=lambda item: item.effect.level)[-1:]
 
 
-def poorer_rivals(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec) -> list[Rival]:
-    """Of IMUs poorer in each of the kinds the likeliest, where it fits the measurements better than chance explains.
+class Other(NamedTuple):
+    """A log by a poorer IMU."""
 
-    Of a log that begins with a known attitude, which need not show what the IMU is worth: a poorer one may fit as well. Arguments
-    as of :func:`poorer_evidence`. Of an innovation x the ratio ``x^2 (1/v_0 - 1/v) - ln(v/v_0)`` has one maximum over its variance,
-    and is nothing at v_0, that of the specification: once it falls, still poorer ones are no likelier.
+    key: str  # of the kind in which it is poorer
+    factor: float
+    ratio: float  # twice the logarithm of its likelihood ratio
+    track: Track
+
+
+def poorer_tracks(
+    run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec, kinds: Mapping[str, Sequence[str]] = KINDS
+) -> list[Other]:
+    """The log by IMUs that are poorer in each of the kinds, up to the likeliest of each and the one after it.
+
+    Arguments as of :func:`poorer_evidence`, and the fields of each kind. Of an innovation x the ratio
+    ``x^2 (1/v_0 - 1/v) - ln(v/v_0)`` has one maximum over its variance, and is nothing at v_0, that of the specification: once it
+    falls, still poorer ones are no likelier.
     """
     found = []
-    for key, fields in KINDS.items():
-        likeliest = (1.0, 0.0, first)
-        for poorer_still in _climb(run, first, spec, fields):
-            if poorer_still[1] < likeliest[1]:
+    for key, fields in kinds.items():
+        before = 0.0
+        for factor, ratio, track in _climb(run, first, spec, fields):
+            found.append(Other(key, factor, ratio, track))
+            if ratio < before:
                 break
-            likeliest = poorer_still
-        factor, ratio, other = likeliest
-        if ratio > limit("rival"):
-            found.append(Rival(ratio, key, {"factor": factor}, effect_of(first, other)))
+            before = ratio
     return found
+
+
+def poorer_rivals(first: Track, others: Sequence[Other]) -> list[Rival]:
+    """Of each kind the likeliest, where it is likelier than chance explains, or what it may do is worth a place in sigma.
+
+    Of a log that begins with a known attitude, which need not show what the IMU is worth: a poorer one may fit as well.
+    """
+    found, chances, sigma = [], _chances(others), last_sizes(first)
+    for key in dict.fromkeys(other.key for other in others):
+        own = [k for k, other in enumerate(others) if other.key == key]
+        best = max((others[k] for k in own), key=lambda other: other.ratio)
+        effect, chance = effect_of(first, best.track), float(chances[own].sum())
+        little = weight(effect.times(math.sqrt(chance)), sigma) <= limit("negligible")
+        if best.ratio > limit("rival") or (best.ratio > 0.0 and not little):
+            found.append(Rival(best.ratio, key, {"factor": best.factor}, effect, chance))
+    return found
+
+
+def growth_along(first: Track, others: Sequence[Other]) -> Array:
+    """(K, 9) by how many times the sigmas of phi, dv and dp are those of the mixture, all along the way; never less than one."""
+    variance = first.sigma[:, :9] ** 2
+    more = np.zeros_like(variance)
+    for other, chance in zip(others, _chances(others), strict=True):
+        near = nearest(other.track.time, first.time)
+        d = first.errors_against(other.track, near)
+        more += chance * (other.track.sigma[near, :9] ** 2 - variance + d**2)
+    return np.sqrt(1.0 + np.maximum(more, 0.0) / np.where(variance > 0.0, variance, np.inf))
+
+
+def _chances(others: Sequence[Other]) -> Array:
+    """That each of them is right, and the specification wrong."""
+    odds = np.exp(0.5 * (np.array([other.ratio for other in others]) - limit("rival")))
+    return np.asarray(odds / (1.0 + odds.sum()))
 
 
 def _climb(

@@ -68,6 +68,7 @@ class Rival(NamedTuple):
     key: str
     figures: Mapping[str, Figure]
     effect: Effect
+    chance: float = 1.0  # that it is right
 
 
 def wandering_evidence(
@@ -116,13 +117,16 @@ def wandering_evidence(
     if not found:
         return []
     best = max(found, key=lambda item: item.ratio)
-    effect = NO_EFFECT
+    shown, effect = NO_EFFECT, NO_EFFECT
     for other in found:
-        effect = Effect(*(max(a, b) for (_, a), (_, b) in zip(effect.items(), other.effect.items(), strict=True)))
-    return [rival(best.key, best.figures, best.ratio, effect, "specification")]
+        shown = shown.or_larger(other.effect)
+        effect = effect.or_larger(other.effect.times(math.sqrt(other.chance)))
+    return [rival(best.key, best.figures, best.ratio, effect, "specification", shown)]
 
 
-def rival(key: str, own: Mapping[str, Figure], ratio: float, effect: Effect, suspect: str) -> Evidence:
+def rival(
+    key: str, own: Mapping[str, Figure], ratio: float, effect: Effect, suspect: str, shown: Effect | None = None
+) -> Evidence:
     """Another model that fits the measurements better: a hint where that may be chance, else an effect of known size.
 
     Parameters
@@ -136,13 +140,16 @@ def rival(key: str, own: Mapping[str, Figure], ratio: float, effect: Effect, sus
         By what the answer moves with the rival.
     suspect : str
         What would be at fault.
+    shown : Effect, optional
+        The same, where `effect` counts by how likely the rival is.
     """
+    said = effect if shown is None else shown
     figures: dict[str, Figure] = {
         **own,
         "ratio": ratio,
         "chance": limit("rival"),
-        "heading": effect.heading,
-        "level": effect.level,
+        "heading": said.heading,
+        "level": said.level,
     }
     kind: Kind = "hint" if may_be_chance(ratio) else "known"
     return Evidence(key, figures, kind, effect, (suspect,))
@@ -287,7 +294,7 @@ def moved(first: Track, other: Track) -> Effect:
     other's nearest.
     """
     half = slice(len(first.C_nb) // 2, None)
-    near = _nearest(other.time, first.time[half])
+    near = nearest(other.time, first.time[half])
     off = np.abs(first[half].errors_against(other, near))
     sigma = first.sigma[half, :9]
     known = sigma > 0.0
@@ -296,7 +303,7 @@ def moved(first: Track, other: Track) -> Effect:
     return _of_states(ratio * first.sigma[-1, :9])
 
 
-def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
+def nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
     """Rows of ascending times that lie nearest to those wanted."""
     after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
     return after - (wanted - time[after - 1] < time[after] - wanted)
@@ -306,6 +313,11 @@ def effect_of(first: Track, rival: Track) -> Effect:
     """What the answer moves by, and by what the rival is less sure."""
     more = np.sqrt(np.maximum(rival.sigma[-1, :9] ** 2 - first.sigma[-1, :9] ** 2, 0.0))
     return moved(first, rival).joined(_of_states(more))
+
+
+def last_sizes(track: Track) -> Effect:
+    """One sigma of each output at the end of a track."""
+    return _of_states(track.sigma[-1, :9])
 
 
 def _of_states(size: Array) -> Effect:

@@ -22,6 +22,7 @@ from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, eu
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.axes import standing
 from truenorth.navigation.start import moving_start, start_from_alignment
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
 from truenorth.records import ImuRecord, MasterRecord
@@ -201,7 +202,8 @@ def known_start(
     P = prior_covariance(dv=velocity_sigma, dp=at.sigma, bias_variance=spec.bias_variance)
     P[PHI, PHI] = phi_of @ np.diag([sigma, level_sigma, level_sigma]) ** 2 @ phi_of.T
     zero, begin = np.zeros(3), float(log.time[0] - log.interval)
-    return moving_start(begin, C_nb, np.array(velocity, dtype=np.float64), positive(P), zero, zero, at, spec)
+    v_n = np.array(velocity, dtype=np.float64)
+    return moving_start(begin, C_nb, v_n, positive(P), zero, zero, at, spec, {}, standing())
 
 
 def start_from_master(

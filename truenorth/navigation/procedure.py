@@ -21,7 +21,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
-from truenorth.estimate.poorer import poorer_rivals
+from truenorth.estimate.poorer import growth_along, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.estimate.warming import warming_rivals
@@ -159,20 +159,21 @@ def navigate(
     plan = Plan(
         record, begin, modelled(noise), height, disturbances, *_intervals(record, interval, output, damping is not None)
     )
-    aiding = plan.sources(given)
-    _check_overlap(record, aiding)
+    _check_overlap(record, aiding := plan.sources(given))
     check_places(given, begin, height)
     if zupt is not None:
         tell("looking for stops")
-        seen = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
-        plan = replace(plan, always=[*zero_updates(record, zupt, *seen), *disturbances])
+        logs = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
+        plan = replace(plan, always=[*zero_updates(record, zupt, *logs), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
     plan, used, track, wanders = filtered(plan, given, smooth)
     evidence = [*_seen(plan, track, used), *taken, *wanders, *why, *said]
+    least = None
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
-        evidence += _rivals(plan, track, used, noise, modelled, smooth)
+        seen, least = _rivals(plan, track, used, noise, modelled, smooth)
+        evidence += seen
     else:
         evidence += burst_evidence(record)
     result = Navigation(
@@ -188,7 +189,7 @@ def navigate(
         late=late,
     )
     if damping is None:
-        return judged_navigation(result, counted_once(evidence))
+        return judged_navigation(result, counted_once(evidence), least)
     tell(f"damping: {damping.method}")
     return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, fixes)
 
@@ -240,8 +241,8 @@ def _rivals(
     spec: ImuSpec,
     modelled: Callable[[ImuSpec], InsModel],
     smooth: bool,
-) -> list[Evidence]:
-    """What other biases, a poorer IMU, other clocks and mountings explain better."""
+) -> tuple[list[Evidence], Array]:
+    """What other biases, a poorer IMU, other clocks and mountings explain better, and growth by poorer IMUs."""
     aiding = plan.sources(given)
 
     def again(slow: Slow, model: InsModel) -> Track:
@@ -255,19 +256,20 @@ def _rivals(
         start = of_poorer(plan.start, spec, other)
         return replace(plan, start=start, model=modelled(other)).run(aiding, smooth=smooth)
 
+    others = poorer_tracks(of_another_imu, track, spec)
     usual = partial(again, plan.slow)
     without = [partial(again, less) for less in one_less(plan.slow)]
     found = noise_evidence(usual, track, plan.model, plan.record)
 
     def of_another_course() -> list[Rival]:
-        warming = warming_rivals(of_record, track, plan.record, spec)
-        return warming + poorer_rivals(of_another_imu, track, spec)
+        return warming_rivals(of_record, track, plan.record, spec) + poorer_rivals(track, others)
 
     found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without, of_another_course)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     found += _led_away(plan, track, given, smooth)
     found += _gyros_of_another_moment(plan, given)
-    return found + second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
+    found += second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
+    return found, growth_along(track, others)
 
 
 def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:

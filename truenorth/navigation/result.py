@@ -291,15 +291,28 @@ def last_sigma(track: Track) -> Effect:
     return Effect(heading, float(sigma[PHI][:2].max()), float(sigma[DV].max()), float(sigma[DP].max()))
 
 
-def judged_navigation(result: Navigation, evidence: Sequence[Evidence]) -> Navigation:
-    """The verdict on a navigation by its last epoch; what the evidence adds to sigma is in its covariance, as a share of it."""
+def judged_navigation(result: Navigation, evidence: Sequence[Evidence], least: Array | None = None) -> Navigation:
+    """The verdict on a navigation by its last epoch; what the evidence adds to sigma is in its covariance, as a share of it.
+
+    On the way sigmas of phi, dv and dp grow by (K, 9) times at `least`, unless the model is contradicted.
+    """
     claim = last_sigma(result.track)
     verdict = judge(Claim(claim), evidence)
-    if verdict.added != NO_EFFECT:
-        grows = {name: s / own for (name, s), (_, own) in zip(verdict.sigma.items(), claim.items(), strict=True)}
-        factor = np.ones(result.track.P.shape[-1])
-        factor[PHI] = grows["level"], grows["level"], grows["heading"]
-        factor[DV], factor[DP] = grows["velocity"], grows["position"]
-        result = replace(result, track=replace(result.track, P=factor[:, None] * result.track.P * factor))
     status: Status = verdict.status("navigated")  # type: ignore[assignment]  # navigated or inconsistent
+    if status != "inconsistent" and (verdict.added != NO_EFFECT or least is not None):
+        growth = np.ones(result.track.P.shape[:2]) if least is None else _with_others(least, result.track)
+        if verdict.added != NO_EFFECT:
+            grows = {name: s / own for (name, s), (_, own) in zip(verdict.sigma.items(), claim.items(), strict=True)}
+            of_states = np.ones(growth.shape[1])
+            of_states[PHI] = grows["level"], grows["level"], grows["heading"]
+            of_states[DV], of_states[DP] = grows["velocity"], grows["position"]
+            growth = np.maximum(growth, of_states)
+        P = growth[:, :, None] * result.track.P * growth[:, None, :]
+        result = replace(result, track=replace(result.track, P=P))
     return replace(result, status=status, evidence=verdict.evidence)
+
+
+def _with_others(growth: Array, track: Track) -> Array:
+    """(K, n) the growth of the first states, none of the others."""
+    others = np.ones((len(track), track.P.shape[-1] - growth.shape[-1]))
+    return np.concatenate([growth, others], axis=1)

@@ -23,7 +23,7 @@ from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI, STATES
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import WholeBiases, positive, prior_covariance
-from truenorth.state.state import Start
+from truenorth.state.state import Start, State
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -58,10 +58,10 @@ def start_from_alignment(alignment: Alignment) -> Start:
             alignment.accel_bias,
             alignment.position,
             alignment.imu,
+            moving.known,
+            moving.force,
         )
-        if alignment.moving is None:
-            return start
-        return _with_sensors(replace(start, known=alignment.moving.known), alignment.moving.summary())
+        return start if alignment.moving is None else _with_sensors(start, alignment.moving.summary())
     joint = alignment.handover
     if joint is None:
         joint = _by_static_limits(
@@ -146,20 +146,20 @@ def moving_start(
     accel_bias: Array,
     position: Position,
     spec: ImuSpec,
+    known: Mapping[str, Array],
+    force: Array,
 ) -> Start:
     """Of an alignment on the move, which knows velocity and how all errors are correlated."""
     constant = spec.constant_variance
-    constant[3:] += spec.acting_variance(
-        standing()
-    )  # scale factors and misalignments under gravity are a part of the bias
+    constant[3:] += spec.acting_variance(force)  # scale factors and misalignments under gravity are a part of the bias
     whole = WholeBiases(constant)
-    lat, lon, alt = position.lat, position.lon, position.alt
-    return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)
+    state = State(time, C_nb, v_n, position.lat, position.lon, position.alt, gyro_bias, accel_bias)
+    return replace(Start.of(state, positive(np.asarray(P))), whole=whole, known=known, force=force)
 
 
 def force_at_rest(start: Start) -> Array:
     """(3,) m/s^2, body axes; on what differs from it the accelerometers' axes act: as the IMU stands, or as they were estimated."""
-    return standing() if ACCEL_AXES in start.known else standing(start.C_nb)
+    return start.force if ACCEL_AXES in start.known else standing(start.C_nb)
 
 
 def of_poorer(start: Start, spec: ImuSpec, other: ImuSpec) -> Start:
@@ -246,9 +246,10 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         if "P" in n:
             v_n, P = _finite(n["v_n"]), _finite(n["P"])
             biases = numbers["gyro_bias"], numbers["accel_bias"]
-            start = moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
             known = {str(name): _finite(values) for name, values in n.get("known", {}).items()}
-            start = _with_sensors(replace(start, known=known), s)
+            force = _finite(n.get("force", standing()))
+            begin = float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec, known, force
+            start = _with_sensors(moving_start(*begin), s)
         else:
             gyro_bias = numbers.pop("gyro_bias")
             if "handover" in n:
@@ -293,7 +294,6 @@ def navigation_block(alignment: Alignment) -> dict[str, Any]:
         block["handover"] = {name: getattr(alignment.handover, name).tolist() for name in JOINT}
     moving = alignment.moving or alignment.transfer
     if moving is not None:
-        block |= {"v_n": moving.v_n.tolist(), "P": moving.P.tolist()}
-    if alignment.moving is not None:
-        block["known"] = {name: values.tolist() for name, values in alignment.moving.known.items()}
+        block |= {"v_n": moving.v_n.tolist(), "P": moving.P.tolist(), "force": moving.force.tolist()}
+        block["known"] = {name: values.tolist() for name, values in moving.known.items()}
     return block

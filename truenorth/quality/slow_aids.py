@@ -11,6 +11,7 @@ to hours, multipath for a minute.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -40,6 +41,12 @@ class Lasting:
     group: Group
     white: float = 1.0  # how much of the sigma that the source says is white noise
 
+    @property
+    def across(self) -> bool:
+        """Whether it acts on the first or the last axis, across a wheel's way, more than an axis without slow errors is given."""
+        right, forward, up = self.group.sigma
+        return max(right, up) > LEAST * forward
+
 
 Slow = Mapping[str, Lasting]  # by the source's name
 
@@ -66,6 +73,7 @@ KINDS = {
 LEAST = 1e-3  # of the largest axis: what an axis without slow errors is given
 LEAST_ROWS = 60
 LAGS = 5
+PIECE = 1.0  # s, over which innovations are averaged
 MOST = 6.0 / 0.6745  # times the median, of sizes: six sigmas
 FOLLOWED = 2.0  # times what is left in innovations: the filter has followed it
 
@@ -94,9 +102,9 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
         seen = _wander(residuals, kind.axes)
         if seen is None:
             continue
-        correlation, size = seen
+        correlation, size, of_rows = seen
         sigma = FOLLOWED * size
-        if sigma.max() > kind.most:
+        if max(sigma.max(), FOLLOWED * of_rows) > kind.most:
             continue
         sigma = np.maximum(sigma, LEAST * sigma.max())
         found[source.name] = Lasting(Group(kind.name, sigma, kind.time, unit=residuals.unit))
@@ -110,8 +118,11 @@ def wanders(name: str, correlation: float, size: float, unit: str) -> Evidence:
     return Evidence("innovations.wander", figures)
 
 
-def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
-    """Mean correlation over the first lags, and the root of what rows that follow each other have in common; None: chance."""
+def _wander(residuals: Residuals, axes: int) -> tuple[float, Array, float] | None:
+    """Mean correlation over the first lags, and the root of what means that follow each other have in common; None: chance.
+
+    The last is the largest of what rows have in common: a clock that is late shows in them, and not in means over its changes.
+    """
     rows = residuals.rows > 0
     e, sigma = residuals.innovation[rows, :axes], residuals.sigma[rows, :axes]
     there = np.isfinite(e).all(axis=0)  # heights are left out where height is held
@@ -121,15 +132,40 @@ def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
     # Rows that were rejected may be the slow error itself; outliers count as its largest.
     most = MOST * np.median(np.abs(e), axis=0)
     e = np.clip(e, -most, most)
-    if whiteness(e / sigma).growth <= 1.0:  # white, or no more than sigma says
+    of_rows = math.sqrt(max(float(_alike(e).max()) / len(e), 0.0))
+    e, sigma = _means(residuals.time[rows], e, sigma)
+    if len(e) < LEAST_ROWS:
         return None
-    alike = np.mean([np.sum(e[lag:] * e[:-lag], axis=0) for lag in range(1, LAGS + 1)], axis=0)
-    correlation = float(np.mean(alike / np.sum(e**2, axis=0)))
+    # Axis by axis, too: a wheel's constraints are mostly far better kept than sigma says, and would hide its slip.
+    each = [whiteness(own[:, None]) for own in (e / sigma).T]
+    if all(seen.growth <= 1.0 for seen in (whiteness(e / sigma), *each)):  # white, or no more than sigma says
+        return None
+    larger = np.array([own.size * own.colour > 1.0 for own in each])
+    if not larger.any():
+        return None
+    alike = larger * _alike(e)
+    correlation = float(np.mean((alike / np.sum(e**2, axis=0))[larger]))
     if correlation <= 0.0 or alike.max() <= 0.0:
         return None
     size = np.zeros(axes)
     size[there] = np.sqrt(np.maximum(alike, 0.0) / len(e))
-    return correlation, size
+    return correlation, size, of_rows
+
+
+def _alike(e: Array) -> Array:
+    """(m,) sums of products of rows (M, m) that follow each other, the mean of the first lags."""
+    return np.asarray(np.mean([np.sum(e[lag:] * e[:-lag], axis=0) for lag in range(1, LAGS + 1)], axis=0))
+
+
+def _means(time: Array, e: Array, sigma: Array) -> tuple[Array, Array]:
+    """Innovations (M, m) averaged over pieces of `PIECE`, and one sigma of such means if they are white.
+
+    A wheel that counts pulses rounds a way: what one row has too little the next has too much. Row by row that hides a slip, which
+    is far smaller; of means over seconds little of it is left.
+    """
+    first = np.flatnonzero(np.diff(np.floor((time - time[0]) / PIECE), prepend=-1.0))
+    count = np.diff(first, append=len(e))[:, None]
+    return np.add.reduceat(e, first) / count, np.sqrt(np.add.reduceat(sigma**2, first)) / count
 
 
 def with_slow(aiding: Sequence[Aiding], slow: Slow) -> list[Aiding]:

@@ -29,6 +29,14 @@ class Effect:
         """The root of the sum of squares of two independent errors."""
         return Effect(*(math.hypot(a, b) for (_, a), (_, b) in zip(self.items(), other.items(), strict=True)))
 
+    def or_larger(self, other: Effect) -> Effect:
+        """The larger of each of two effects."""
+        return Effect(*(max(a, b) for (_, a), (_, b) in zip(self.items(), other.items(), strict=True)))
+
+    def times(self, factor: float) -> Effect:
+        """So many times as large."""
+        return Effect(*(factor * size for _, size in self.items()))
+
 
 NO_EFFECT = Effect()
 ANY_EFFECT = Effect(math.inf, math.inf, math.inf, math.inf)

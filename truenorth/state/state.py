@@ -62,8 +62,10 @@ class Start(State):
     plumb : float, rad
         One-sigma deflection of the vertical that P holds as tilt and accelerometer bias that cancel each other; 0: none.
     known : mapping of name to (m,) values
-        Groups that an alignment on the move has estimated, such as the IMU's scale factors and misalignments
+        Groups that an alignment on the move, or a transfer, has estimated, such as the IMU's scale factors and misalignments
         (:mod:`truenorth.errors.axes`): they stand behind the fifteen in P, in this order.
+    force : (3,) array, m/s^2
+        Specific force at rest, body axes: known axes of the accelerometers act on what differs from it. Zeros where none are known.
     """
 
     P: Array
@@ -72,6 +74,7 @@ class Start(State):
     gnss_delay: tuple[float, float] | None = None
     plumb: float = 0.0
     known: Mapping[str, Array] = field(default_factory=dict)
+    force: Array = field(default_factory=lambda: np.zeros(3))
 
     @classmethod
     def of(cls, state: State, P: Array) -> Start:
