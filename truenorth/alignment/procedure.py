@@ -284,10 +284,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
         return _Found(replace(answer, disturbance=disturbance), check)
 
-    sways, turned, swings = method == "swaying", None, task.motion.overall != "still"
+    sways, turned = method == "swaying", None
     if turns and method not in FADING:
         turned = used = with_usual(used) if spec is None else used
         P = np.diag(used.bias_variance)
+    # A table that turns an IMU does not rock with it: its log is fitted as it is, and its IMU sits near the axis.
+    swings = task.motion.overall != "still" and (turned is None or rocks_all_along(task.motion))
     start = CoarseStart(task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
     if method in FADING:
         fine = faded_align(start, method)
@@ -306,7 +308,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     elif sways:
         fine = sway_align(start, turned=turned, axes=spec)
     elif turned is not None:
-        fine = fine_align(start, turned=turned)
+        fine = fine_align(start, turned=turned, sways=swings)
     else:
         fine = fine_align(start, integrals, picked, sways=swings)
     del integrals, filtered, coarse  # of the first pass; what follows takes memory
@@ -316,7 +318,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    swung = sways or (swings and turned is None)
+    swung = sways or swings
     others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if swung else None
     if swung and not sways and fine.form == "velocity":
         biased = swung_biases(fine, np.sqrt(used.bias_variance[3:]), task.position)
