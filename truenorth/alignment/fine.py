@@ -42,6 +42,7 @@ from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 Array = NDArray[np.float64]
 
 MAX_PASSES = 8
+BENT_PASSES = 24  # of a log as short as `BEND`, whose heading moves by tens of degrees a pass
 MAX_NOISE_PASSES = 6
 ARM_PRIOR = 30.0  # m, one sigma along each axis, of a base that sways, where nobody knows the arm
 BEND = 2.0 * SLOWEST_SEA  # s: of a turn slower than the sea a log as short as this shows no course of its own
@@ -224,7 +225,8 @@ def settle_fine(
     arm_sigma = ARM_PRIOR if sways else TURN_ARM
     arm = None if turned is None and not sways else np.zeros(3)
     # Of a log that short the slow turn is a bend, which an arm that waves show would make a bent course, and a tilt, of.
-    slow_arm = ARM_PRIOR if sways and record.duration <= BEND else 0.0
+    bent = sways and record.duration <= BEND
+    slow_arm = ARM_PRIOR if bent else 0.0
     prior = prior_of(P_bias, spec=turned, arm=arm, arm_sigma=arm_sigma, slow_arm_sigma=slow_arm)
     log = StayingLog(
         record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, sways=sways, form=form
@@ -237,7 +239,8 @@ def settle_fine(
         R = np.maximum(white_variance(gained) - expected, max(SLIGHT * expected, QUIETEST_BASE**2))
     everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
     noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES, history=history)
-    last = settle(log, noise, left_over(float(log.integrals.time[-1])), most=MAX_PASSES)
+    most = BENT_PASSES if bent else MAX_PASSES
+    last = settle(log, noise, left_over(float(log.integrals.time[-1])), most=most)
     return log, last, np.sqrt(noise.R[0])
 
 
