@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_rotation_vector, rotate
 from truenorth.core.compiled import compiled
 from truenorth.core.position import Position
+from truenorth.errors.arm import SLOWEST_SEA
 from truenorth.errors.staying import (
     BA,
     BG,
@@ -41,8 +42,10 @@ from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 Array = NDArray[np.float64]
 
 MAX_PASSES = 8
+BENT_PASSES = 24  # of a log as short as `BEND`, whose heading moves by tens of degrees a pass
 MAX_NOISE_PASSES = 6
 ARM_PRIOR = 30.0  # m, one sigma along each axis, of a base that sways, where nobody knows the arm
+BEND = 2.0 * SLOWEST_SEA  # s: of a turn slower than the sea a log as short as this shows no course of its own
 TURN_ARM = 1.0  # m, one sigma along each axis: from the axis of a turntable to the IMU
 TURNED = 3.0  # how much of a correction the next pass may move, for each radian that the linearisation turns; twice the most seen
 LEVEL = slice(PHI.start, PHI.stop - 1)
@@ -219,9 +222,12 @@ def settle_fine(
 ) -> tuple[StayingLog, Settled[Filtered], Array]:
     """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains (or a history) are not wanted."""
     record, C_n0_i, position, model, P_bias, interval, rows_at = start
-    arm_sigma = TURN_ARM if turned is not None else ARM_PRIOR
+    arm_sigma = ARM_PRIOR if sways else TURN_ARM
     arm = None if turned is None and not sways else np.zeros(3)
-    prior = prior_of(P_bias, spec=turned, arm=arm, arm_sigma=arm_sigma)
+    # Of a log that short the slow turn is a bend, which an arm that waves show would make a bent course, and a tilt, of.
+    bent = sways and record.duration <= BEND
+    slow_arm = ARM_PRIOR if bent else 0.0
+    prior = prior_of(P_bias, spec=turned, arm=arm, arm_sigma=arm_sigma, slow_arm_sigma=slow_arm)
     log = StayingLog(
         record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, sways=sways, form=form
     )
@@ -233,7 +239,8 @@ def settle_fine(
         R = np.maximum(white_variance(gained) - expected, max(SLIGHT * expected, QUIETEST_BASE**2))
     everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
     noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES, history=history)
-    last = settle(log, noise, left_over(float(log.integrals.time[-1])), most=MAX_PASSES)
+    most = BENT_PASSES if bent else MAX_PASSES
+    last = settle(log, noise, left_over(float(log.integrals.time[-1])), most=most)
     return log, last, np.sqrt(noise.R[0])
 
 

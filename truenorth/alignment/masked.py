@@ -23,12 +23,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import MAX_NOISE_PASSES, FineAlignment
-from truenorth.alignment.slow_sway import causes
+from truenorth.alignment.matched import whitened
+from truenorth.alignment.slow_sway import Cause, causes
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.alignment.usual import wandering_as_usual
 from truenorth.errors.staying import BA, BG, PHI, QUIETEST_BASE, StaticModel
 from truenorth.estimate.base_motion import VelocityNoise
 from truenorth.filters import LinearSystem, kalman
+from truenorth.filters.gains import filter_gains, through
+from truenorth.quality.colour import colour_of
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit, may_be_chance
@@ -51,10 +54,13 @@ def masked_evidence(fine: FineAlignment, spec: ImuSpec) -> list[Evidence]:
     ]
     # A noise that one of them finds is open to all: none is likelier because its search ended better.
     noises = [_likeliest(fine, spec, system) for system in without]
-    (nothing, end), *others = (
+    (nothing, end, _), *others = (
         min((_filtered(system, *noise) for noise in noises), key=lambda e: e[0]) for system in without
     )
-    found = [(nothing - cost, cause, np.abs(phi - end)) for (cost, phi), cause in zip(others, begun)]
+    found = [
+        (_weighed(nothing - cost, filtered, cause), cause, np.abs(phi - end))
+        for (cost, phi, filtered), cause in zip(others, begun)
+    ]
     ratio, best, _ = max(found, key=lambda item: item[0])
     if ratio <= limit("hint"):
         return []
@@ -101,7 +107,19 @@ def _likeliest(fine: FineAlignment, spec: ImuSpec, system: LinearSystem) -> tupl
     return min(tried, key=lambda item: item[0])[1:]
 
 
-def _filtered(system: LinearSystem, R: Array, Q: Array) -> tuple[float, Array]:
-    """With such noise: minus twice the logarithm of the likelihood, and the misalignment (3,) at the end."""
-    estimates = kalman(system.with_made(R=R).with_arrays(Q=Q), history="last")
-    return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
+def _filtered(system: LinearSystem, R: Array, Q: Array) -> tuple[float, Array, LinearSystem]:
+    """With such noise: minus twice the logarithm of the likelihood, and the misalignment (3,) at the end; and that system."""
+    noisy = system.with_made(R=R).with_arrays(Q=Q)
+    estimates = kalman(noisy, history="last")
+    return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI]), noisy
+
+
+def _weighed(ratio: float, without: LinearSystem, cause: Cause) -> float:
+    """A ratio by the colour of what is left of the innovations, of a system without its cause."""
+    if ratio <= limit("hint"):
+        return ratio
+    estimates = kalman(without, history="full")
+    L: Array = np.asarray(np.linalg.cholesky(estimates.innovation_covariance), dtype=np.float64)
+    signature = through(filter_gains(without, estimates), cause.seen[..., None])[0]
+    white = whitened(L, np.concatenate([estimates.innovation[..., None], signature], axis=2))
+    return colour_of(white[:, :, 0], white[:, :, 1]).ratio(ratio)

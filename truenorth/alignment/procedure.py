@@ -17,10 +17,11 @@ from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
+from truenorth.alignment.brief_sway import bent_by_heading, may_swing_on_lines
 from truenorth.alignment.by_heave import weighed_by_heave
 from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, is_lost, sharper
 from truenorth.alignment.drift import Drift
-from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
+from truenorth.alignment.fine import BEND, CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.from_means import SHORTEST_FILTER, from_means, level_from_means, turned_by
 from truenorth.alignment.handover import go_on, hand_over
@@ -286,10 +287,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
         return _Found(replace(answer, disturbance=disturbance), check)
 
-    sways, turned, swings = method == "swaying", None, task.motion.overall != "still"
+    sways, turned = method == "swaying", None
     if turns and method not in FADING:
         turned = used = with_usual(used) if spec is None else used
         P = np.diag(used.bias_variance)
+    # A table that turns an IMU does not rock with it: its log is fitted as it is, and its IMU sits near the axis.
+    swings = task.motion.overall != "still" and (turned is None or rocks_all_along(task.motion))
     start = CoarseStart(task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
     if method in FADING:
         fine = faded_align(start, method)
@@ -308,22 +311,26 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     elif sways:
         fine = sway_align(start, turned=turned, axes=spec)
     elif turned is not None:
-        fine = fine_align(start, turned=turned)
+        fine = fine_align(start, turned=turned, sways=swings)
     else:
         fine = fine_align(start, integrals, picked, sways=swings)
     del integrals, filtered, coarse  # of the first pass; what follows takes memory
-    answer = replace(answer_of(task, fine, used, where, P, sways), ongoing=go_on(task, fine, StaticModel.of(used)))
+    short = swings and not sways and task.record.duration <= BEND
+    answer = answer_of(task, fine, used, where, P, sways, bent_by_heading(fine, lat) if short else None)
+    answer = replace(answer, ongoing=go_on(task, fine, StaticModel.of(used)))
     if turned is not None:  # the check knows no scale factors
         check = replace(check, rate_residual=np.zeros(2), rate_noise=np.full(2, math.inf))
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    swung = sways or (swings and turned is None)
+    if short:
+        check = may_swing_on_lines(check, task.position)
+    swung = sways or swings
     others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if swung else None
     if swung and not sways and fine.form == "velocity":
         biased = swung_biases(fine, np.sqrt(used.bias_variance[3:]), task.position)
         others = biased if others is None else np.concatenate([others, biased], axis=2)
-    drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
+    drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None, sways=swung)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
     heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
@@ -352,14 +359,23 @@ def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, 
 
 
 def answer_of(
-    task: Task, fine: FineAlignment, used: ImuSpec, where: str, P_bias: Array, sways: bool = False
+    task: Task,
+    fine: FineAlignment,
+    used: ImuSpec,
+    where: str,
+    P_bias: Array,
+    sways: bool = False,
+    bent: Array | None = None,
 ) -> Alignment:
-    """The answer of a filter at the epoch asked for, with its history."""
+    """The answer of a filter at the epoch asked for, with its history; `bent` (3, 3) is more covariance of its misalignment."""
     C_ib = task.epoch.attitude(fine.integrals.C_ib_at[0])
     answer = at_epoch(task, used, where, *fine.misalignment_at(C_ib, task.epoch.elapsed))
     if sways:
         answer = replace(answer, phi_covariance=answer.phi_covariance + creep(task, task.record.duration))
     history = make_history(task, fine, used, sways)
+    if bent is not None:
+        answer = replace(answer, phi_covariance=answer.phi_covariance + bent)
+        history = replace(history, phi_covariance=history.phi_covariance + bent)
     accel_bias, accel_sigma = true_bias(fine.bias[3:], np.diag(fine.P)[BA], np.diag(P_bias)[3:], used.bias_variance[3:])
     return replace(
         answer,

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import bias_signatures, bias_step_evidence
+from truenorth.alignment.coloured import weighed_by_colour
 from truenorth.alignment.drift import Drift, detect_drift, drift_signatures
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
@@ -22,7 +23,13 @@ Array = NDArray[np.float64]
 
 
 def what_begins(
-    fine: FineAlignment, spec: ImuSpec, position: Position, others: Array | None = None, *, given: bool = True
+    fine: FineAlignment,
+    spec: ImuSpec,
+    position: Position,
+    others: Array | None = None,
+    *,
+    given: bool = True,
+    sways: bool = False,
 ) -> tuple[Drift, list[Evidence], list[Evidence]]:
     """The drift that matches best, evidence of a bias that steps, and of the other hemisphere; `others` explain what they can.
 
@@ -32,11 +39,14 @@ def what_begins(
         As of :func:`truenorth.alignment.matched.innovations_of`.
     given : bool
         Whether somebody has given the specification: then its noise is held against the log.
+    sways : bool
+        Whether the base does: then the colour of the innovations counts.
     """
     seen = innovations_of(fine, others)
-    drift, bias, gravity = matched(
-        seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
-    )
+    banks = drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
+    drift, bias, gravity = matched(seen, *banks)
+    if sways:
+        drift, bias = weighed_by_colour(seen, banks[:2], (drift, bias))
     steps = bias_step_evidence(fine, spec, bias)
     steps += masked_evidence(fine, spec)
     elsewhere = None

@@ -28,6 +28,7 @@ from truenorth.errors.staying import PHI
 from truenorth.errors.sway import AxisMotion, Oscillator, motion_first
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.gains import filter_gains, through
+from truenorth.quality.colour import colour_of
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit, may_be_chance
 
@@ -97,8 +98,10 @@ def slow_sway_evidence(
     likely = [cause for least, cause in found if lowest - cause.cost > least]
     if not likely:
         return []
-    best = min(likely, key=lambda cause: cause.cost)
-    ratio = lowest - best.cost
+    seen = innovations_of(fine)
+    ratio, best = max(
+        ((_weighed(fine, seen, cause, lowest - cause.cost), cause) for cause in likely), key=lambda pair: pair[0]
+    )
     end = as_fitted.x[-1][PHI]
     moved = np.array([cause.phi for cause in likely]) - end
     heading, level = float(np.abs(moved[:, 2]).max()), float(np.hypot(moved[:, 0], moved[:, 1]).max())
@@ -117,6 +120,15 @@ def slow_sway_evidence(
             return []  # what nobody can rule out, and changes nothing
         return [Evidence("sway.slow", figures, "hint", effect, ("record_longer",))]
     return [Evidence(best.key, figures, "bounded", effect, ("still_part",))]
+
+
+def _weighed(fine: FineAlignment, seen: Innovations, cause: Cause, ratio: float) -> float:
+    """A ratio by the colour of the innovations, as what the cause makes of them sees it."""
+    if may_be_chance(ratio):
+        return ratio
+    nu, signature = seen.white[:, :, 0], whitened(seen.L, through(fine.gains, cause.seen[..., None])[0])[:, :, 0]
+    size = float(np.sum(nu * signature) / np.sum(signature**2))  # the motion as fitted has taken up a part
+    return colour_of(nu - size * signature, signature).ratio(ratio)
 
 
 def _with_less(fine: FineAlignment, less: LinearSystem) -> FineAlignment:
