@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth import ImuRecord
+from truenorth import ImuRecord, Position, align
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.units import STANDARD_GRAVITY
-from truenorth.records.specified import corrected, in_time, lag, seen_in
+from truenorth.records.specified import corrected, epoch_felt, in_time, lag, seen_in
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.scenario import read_scenario
 
@@ -83,6 +83,15 @@ def test_lag_of_a_low_pass():
     whole, late = in_time(spec)
     assert late == lag(spec, "accel")
     assert lag(whole, "gyro") == lag(whole, "accel") == 0.0
+
+
+def test_an_epoch_at_the_last_stamp_is_the_last_moment_felt():
+    record = simulated({}, {}).simulate(seed=1).record
+    spec = replace(imu_spec("navigation"), gyro_latency=0.01, accel_latency=0.01)
+    assert epoch_felt(record.time[-1], record, spec) == record.time[-1] - 0.01
+    assert epoch_felt(record.time[10], record, spec) == record.time[10]
+    found = align(record, Position.from_degrees(40.0, 0.0), spec, at=float(record.time[-1]))
+    assert found.time == record.time[-1] - 0.01
 
 
 def at_rest(count=1000, T=0.02):

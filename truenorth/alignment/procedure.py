@@ -133,10 +133,9 @@ def align_base(
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     spec = None if imu is None else noise_in(record, imu_spec(imu)).with_coning_of(record)
-    as_written, record = record, corrected(record, spec, calibration)
-    untouched = as_written is record
-    record = bridged(record)
-    written = record if untouched else bridged(as_written)  # counts, and rows that repeat, are what the sensors wrote
+    as_written, right = record, corrected(record, spec, calibration)
+    record = bridged(right)
+    written = record if right is as_written else bridged(as_written)  # counts, and rows that repeat, are as written
     if record.duration < SHORTEST or len(record) < 10:
         raise AlignmentError(
             f"{record.source}: {len(record)} samples over {record.duration:g} s; at least 10 samples and {SHORTEST:g} s "
@@ -173,7 +172,8 @@ def align_base(
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)
     evidence += [] if sound else quantum_evidence(written, position.lat)
     if method in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
-        own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
+        known: dict[str, Any] = {"calibration": calibration, "heading_limit": heading_limit, "sound": sound}
+        own = align_base(as_written, position, imu, at=at, progress=progress, **known)
         evidence += against(own, answer)
     evidence = weighed_by_heave(found.heave, evidence, task.record)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)

@@ -18,7 +18,8 @@ from truenorth.core.plugins import plugin, plugins
 from truenorth.core.position import Position
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
-from truenorth.records.specs import ImuSpec
+from truenorth.records.specified import epoch_felt
+from truenorth.records.specs import ImuSpec, imu_spec
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,13 @@ class Request:
     heading_limit: float
     progress: Callable[[str], None] | None
     options: Mapping[str, Any]
+
+    @property
+    def epoch(self) -> float | None:
+        """For when, s: in a log whose sensors are late not after the last moment that they felt."""
+        if self.at is None or self.imu is None:
+            return self.at
+        return epoch_felt(self.at, self.record, imu_spec(self.imu))
 
     @property
     def common(self) -> dict[str, Any]:
@@ -142,7 +150,7 @@ def on_base(r: Request) -> Alignment:
     from truenorth.alignment.procedure import align_base
 
     method: Any = r.method  # checked by `align`
-    return align_base(r.record, r.needed_place(), r.imu, method, at=r.at, calibration=r.calibration, **r.common)
+    return align_base(r.record, r.needed_place(), r.imu, method, at=r.epoch, calibration=r.calibration, **r.common)
 
 
 def in_motion(r: Request) -> Alignment:
@@ -219,7 +227,7 @@ def on_indexer(r: Request) -> Alignment:
         lever_arm=None if indexer.lever_arm is None else -np.asarray(indexer.lever_arm, dtype=np.float64),
         angle_sigma=indexer.angle_sigma,
         offset_sigma=indexer.offset_sigma,
-        at=r.at,
+        at=r.epoch,
         method=r.method,
         **r.common,
     )

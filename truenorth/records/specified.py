@@ -83,6 +83,13 @@ def at_its_time(record: ImuRecord, spec: ImuSpec) -> ImuRecord:
     return replace(record, time=record.time - late, **moved)
 
 
+def epoch_felt(at: float, record: ImuRecord, spec: ImuSpec) -> float:
+    """An epoch of a log whose sensors are late: after the last moment that they felt it is that moment."""
+    last = float(record.time[-1])
+    felt = last - max(lag(spec, "gyro"), lag(spec, "accel"))
+    return felt if felt < at <= last else at
+
+
 def in_time(spec: ImuSpec) -> tuple[ImuSpec, float]:
     """For rows that come one by one: the specification without lags, and the larger of them, s, to take off the stamps.
 
