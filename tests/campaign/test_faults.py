@@ -170,6 +170,9 @@ def test_an_inner_angle_whose_zero_is_off_wobbles():
             assert bool(found) == (off != 0.0)
             if found:
                 assert np.degrees(found[0].figures["off"]) == pytest.approx(off, abs=0.03)
+        angles = inputs["encoder"].angles
+        disc = replace(inputs["encoder"], angles=angles + np.radians(1.0) * np.sin(angles) * [0.0, 1.0])
+        assert zero_evidence(inputs["record"], _reading(disc, ("z", "x"), np.eye(2)), _inner(disc, ("z", "x")))
 
 
 def test_a_late_encoder_is_in_sigma_or_refused():

@@ -77,7 +77,8 @@ def zero_evidence(
     leaves out what sways faster than ``u`` turns. Its sigma is from their scatter, and from what is found about three axes that
     move as fast, and about which no such error turns the base. (An error of the outer angle's zero defines the body's axes anew:
     nothing shows it.) An encoder that is late by ``t`` looks like ``d = -t`` times the rate of the inner axis, where that goes on
-    in one direction, and turns heading by ``t`` times the rate of the outer one.
+    in one direction, and turns heading by ``t`` times the rate of the outer one. Where `d` changes from window to window by far
+    more than what is found about the other axes, it goes with the inner angle, as of a disc that is not centred.
 
     Parameters
     ----------
@@ -99,9 +100,13 @@ def zero_evidence(
     if len(windows) < FEWEST_WINDOWS:
         return []
     found, *others = ([_along(turn, axis, swept, part) for part in windows] for axis in (u, *_unlike(u)))
-    scatter = np.concatenate([np.array(found) - np.mean(found), *others])
+    swings = np.array(found) - np.mean(found)
+    scatter = np.concatenate([swings, *others])
     off, sigma = -float(np.mean(found)), SHARED * math.sqrt(float(np.mean(scatter**2)) / len(found))
-    if abs(off) < max(limit("indexer"), student_limit(limit("few turns"), 3 * len(found) - 1)) * sigma:
+    swing, sway = (math.sqrt(float(np.mean(np.square(x)))) for x in (swings, others))
+    if swing > max(USUAL_ZERO, limit("indexer") * sway):  # it goes with the inner angle: an eccentric disc
+        off, sigma = math.sqrt(2.0) * swing, sway
+    elif abs(off) < max(limit("indexer"), student_limit(limit("few turns"), 3 * len(found) - 1)) * sigma:
         return []
     effect = Effect(max(1.0, times) * abs(off), abs(off))
     kind: Kind = "bounded" if abs(off) > USUAL_ZERO else "known"
