@@ -10,13 +10,13 @@ from truenorth.records import ImuRecord
 
 
 @pytest.mark.parametrize(("run", "late"), [(1, 0.01), pytest.param(3, 0.02, marks=pytest.mark.slow)])
-def test_gyros_that_a_filter_delays_are_in_the_sigma_of_level(run, late):
-    """Seed 1: before, level was 4.9 and 9.1 sigmas off, `aligned`, without a word."""
+def test_gyros_that_a_filter_delays_are_in_the_sigma_of_level_or_refused(run, late):
+    """Seed 1: before, level was 4.9 and 9.1 sigmas off, `aligned`, without a word. The vertical shows 20 ms beyond doubt."""
     inputs, truth = BENCHES["swaying"].draw(1, run)
     answer = BENCHES["swaying"].align(inputs | {"record": gyros_behind(inputs["record"], late)})
     (found,) = [item for item in answer.evidence if item.key in ("response.gyros_late", "heave.delay")]
     assert 0.9 * late < found.figures["delay"] < 1.1 * late
-    assert answer.status == "aligned"
+    assert answer.status == ("aligned" if late < 0.02 else "inconsistent")
     assert max(np.abs(x).max() for x in misses(answer, truth).values()) < 3.0
 
 

@@ -36,7 +36,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from truenorth.core.position import Position
-from truenorth.errors.staying import mean_velocity
+from truenorth.errors.staying import local_axes, mean_velocity
 from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
@@ -163,7 +163,9 @@ class Heave:
         return np.asarray(basis @ np.linalg.eigh(_walked(basis))[1])
 
     def _velocity(self, log: InertialIntegrals) -> Array:
-        return np.asarray(mean_velocity(log, self._part[1], self.position.lat, self.position.alt)[:, 2])
+        v = mean_velocity(log, self._part[1], self.position.lat, self.position.alt)
+        # Along the vertical of its time: the one at the start is a degree off four minutes later, and a level motion shows in it.
+        return np.einsum("ki,ki->k", local_axes(log.time, self.position.lat)[:, 2], v)
 
     def _slow(self, record: ImuRecord) -> Array:
         """(n,) the slow part of the vertical velocity, m/s."""
