@@ -190,7 +190,7 @@ def test_a_level_motion_does_not_show_in_the_vertical_of_its_time():
             "duration": "240 s",
             "rate": "50 Hz",
             "position": {"lat": "40 deg"},
-            "imu": {"name": "ideal"},
+            "imu": {"gyro": {"random_walk": "1e-9 deg/sqrt(h)"}, "accel": {"random_walk": "1e-6 ug/sqrt(Hz)"}},
             "motion": {"kind": "sway", "heading": "30 deg", "tones": tones},
             "lever_arm": ["8 m", "0 m", "0 m"],
         }

@@ -17,7 +17,7 @@ def test_gyros_that_a_filter_delays_are_in_the_sigma_of_level_or_refused(run, la
     (found,) = [item for item in answer.evidence if item.key in ("response.gyros_late", "heave.delay")]
     assert 0.9 * late < found.figures["delay"] < 1.1 * late
     assert answer.status == ("aligned" if late < 0.02 else "inconsistent")
-    assert max(np.abs(x).max() for x in misses(answer, truth).values()) < 3.0
+    assert answer.status != "aligned" or max(np.abs(x).max() for x in misses(answer, truth).values()) < 3.0
 
 
 def test_gyros_late_by_a_quarter_of_a_row_are_seen_where_the_fitted_motion_takes_up_a_part():
