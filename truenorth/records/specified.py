@@ -11,10 +11,10 @@ accelerometer what its own place adds is taken off,
 
 | term | counts as |
 | --- | --- |
-| g-sensitivity G | a gyro bias ``G g``, and a random walk that reaches ``G max |integral (f - mean f) dt|`` at the end |
-| asymmetry A of a scale factor | a scale factor, and where x swings through zero a bias ``A (mean |x| - |mean x|)`` and a walk |
-| bias with temperature c | a bias ``c max |dT|``, and a walk of the bias that reaches ``c |dT_end - dT_begin|`` at the end |
-| scale factor with temperature | a scale factor ``c max |dT|`` |
+| g-sensitivity G | a gyro bias ``G g``, and a random walk that reaches ``G max abs(integral (f - mean f) dt)`` at the end |
+| asymmetry A of a scale factor | a scale factor; of a swing a bias ``A (mean abs(x) - abs(mean x))`` and such a walk, too |
+| bias with temperature c | a bias ``c max abs(dT)``, and a walk of the bias that reaches ``c abs(dT_end - dT_begin)`` at the end |
+| scale factor with temperature | a scale factor ``c max abs(dT)`` |
 
 ``dT = start + rate tau (1 - exp(-t/tau))`` above the temperature of calibration, t from the beginning of the log.
 
