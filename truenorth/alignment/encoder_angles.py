@@ -43,7 +43,7 @@ class CarriedAngles:
     swing : float, rad/s^2
         RMS of the body's angular acceleration about the axes, which they do not know of there.
     noise : float, rad
-        White noise of the encoder's rows, steps of its resolution included.
+        White noise of the encoder's rows, steps of its resolution included while it turns.
     """
 
     record: EncoderRecord

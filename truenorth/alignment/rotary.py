@@ -223,8 +223,9 @@ def _of_encoder(
     found = encoder_evidence(record, given, readings, gyro_bias)
     found += record_evidence(record, task.motion, given, accel_bias=accel_bias)
     if len(axes) == 2:
-        outer, inner = np.abs(np.diff(encoder.angles, axis=0)).sum(axis=0)
-        found += zero_evidence(record, given, _inner(encoder, axes), outer / max(inner, 1e-9))
+        outer, inner = np.abs(np.diff(np.unwrap(encoder.angles, axis=0)[[0, -1]], axis=0)[0])
+        times = outer / inner if inner > 2.0 * math.pi else 1.0  # of what comes back a delay is no zero
+        found += zero_evidence(record, given, _inner(encoder, axes), times)
     return found + notes(encoder.notes)
 
 

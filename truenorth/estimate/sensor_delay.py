@@ -26,6 +26,7 @@ from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import likelihood_ratio, moved, rival
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import held_at_ends
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
@@ -121,8 +122,7 @@ def gyros_later(record: ImuRecord, rows: int) -> ImuRecord:
 
 def gyros_behind(record: ImuRecord, late: float) -> ImuRecord:
     """The record with its gyros late by so many seconds, parts of a row too."""
-    behind = [np.interp(record.time - late, record.time, x) for x in record.gyro.T]
-    return replace(record, gyro=np.stack(behind, axis=1))
+    return replace(record, gyro=held_at_ends(record.time, record.gyro, record.time - late))
 
 
 def _peak(ratios: dict[int, float], best: int) -> int:

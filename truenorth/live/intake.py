@@ -88,6 +88,8 @@ class Intake:
         By which the sensors are late, as their specification says; the stamps become earlier by it.
     """
 
+    late = 0.0  # of a run that was kept before there were any
+
     def __init__(self, late: float = 0.0) -> None:
         self.late = late
         self.counts = Counts()
@@ -103,7 +105,8 @@ class Intake:
         rows : (K, 7) array
         """
         sound = self._sound(rows)
-        sound[:, 0] -= self.late
+        if self.late:
+            sound = sound - np.array([self.late, *np.zeros(6)])
         if not len(sound):
             return []
         if not self._ahead and self._goes_on(sound[:, 0]):

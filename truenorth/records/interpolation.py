@@ -71,6 +71,11 @@ class Between:
         return left, right if period is None else right + period * np.round((left - right) / period)
 
 
+def held_at_ends(time: Array, values: Array, times: Array) -> Array:
+    """(M, m) of (N, m) values at other times, along straight lines; beyond the ends the first and the last."""
+    return np.stack([np.interp(times, time, column) for column in values.T], axis=1)
+
+
 def interpolated(record: Any, times: ArrayLike) -> dict[str, Any]:
     """The arrays of a record of poses at other times, by name; what it does not hold stays None.
 

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.records.calibration import Calibration
 from truenorth.records.imu import ImuRecord
+from truenorth.records.interpolation import held_at_ends
 from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
@@ -78,8 +79,7 @@ def at_its_time(record: ImuRecord, spec: ImuSpec) -> ImuRecord:
     moved: dict[str, Any] = {}
     for sensor, own in lags.items():
         if own < late:  # what it read that much earlier
-            then = record.time - (late - own)
-            moved[sensor] = np.stack([np.interp(then, record.time, x) for x in getattr(record, sensor).T], axis=1)
+            moved[sensor] = held_at_ends(record.time, getattr(record, sensor), record.time - (late - own))
     return replace(record, time=record.time - late, **moved)
 
 
@@ -106,12 +106,12 @@ def _in_the_centre(record: ImuRecord, spec: ImuSpec) -> ImuRecord:
     """The record with the size effect of its accelerometers taken off."""
     if spec.accel_positions is None:
         return record
-    T = record.interval if record.kind == "increments" else 1.0
+    T = record.steps[:, None] if record.kind == "increments" else np.ones((len(record), 1))
     w = record.gyro / T
     turning = np.gradient(w, record.time, axis=0)
     accel = record.accel.copy()
     for i, r in enumerate(np.asarray(spec.accel_positions)):
-        accel[:, i] -= T * (np.cross(w, np.cross(w, r)) + np.cross(turning, r))[:, i]
+        accel[:, i] -= (T * (np.cross(w, np.cross(w, r)) + np.cross(turning, r)))[:, i]
     return replace(record, accel=accel)
 
 
