@@ -65,6 +65,23 @@ def test_between_rows_the_gyros_carry_the_angles(axes, sway):
     )  # no noise: the little that differences leave of the body's motion
 
 
+@pytest.mark.parametrize("whole", [2.0 * np.pi, np.pi])
+def test_an_encoder_that_begins_anew_at_each_turn_is_the_same(whole):
+    """From -pi to pi, or 0 to 2 pi: jumps by a turn are no noise, and no turn."""
+    angles, record, encoder = turned("zx", 0.07, len(TIME) - 3)
+    more = 0.3 * TIME[:, None]  # both go on turning
+    C = C_bs_from_angles("zx", angles + more)
+    gyro = rotation_vector_from_dcm(np.swapaxes(C[:-1], 1, 2) @ C[1:])
+    record = ImuRecord(record.time, gyro, record.accel, "increments")
+    given = (angles + more)[: len(TIME) - 3 : EVERY]
+    begun = (given - whole) % (2.0 * np.pi) + whole - 2.0 * np.pi
+    assert np.abs(np.diff(begun, axis=0)).max() > 6.0
+    found = carried_angles(EncoderRecord(encoder.time, begun), record, "zx")
+    assert found.noise < 1e-5
+    off = (found.record.angles - angles - more)[10:-10]
+    assert np.abs(off - 2.0 * np.pi * np.round(off / (2.0 * np.pi))).max() < 1e-4
+
+
 def test_noise_of_the_encoder_is_in_sigma():
     """It is found, and so is what it does to the tangent along which the last rows go on."""
     angles, record, encoder = turned("zx", 0.07, len(TIME) - 3)

@@ -100,12 +100,13 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
         turned = np.einsum("kai,ki->ka", np.linalg.pinv(J), dtheta)
         by_gyros = np.concatenate([np.zeros((1, len(axes))), np.cumsum(turned, axis=0)])
         at_rows = np.stack([np.interp(time, edges, column) for column in by_gyros.T], axis=-1)
-        of_body = CubicSpline(time, given - at_rows)
+        own = np.unwrap(given - at_rows, axis=0)  # the gyros know by how many turns
+        of_body = CubicSpline(time, own)
         # Beyond its ends on along its tangents: its cubics would run away.
         inside = np.clip(edges, time[0], time[-1])
         angles = by_gyros + of_body(inside) + (edges - inside)[:, None] * of_body(inside, 1)
     swing = float(np.sqrt(np.max(np.mean(of_body(time, 2) ** 2, axis=0))))
-    noise, step = _white(given - at_rows), float(np.median(np.diff(time)))
+    noise, step = _white(own), float(np.median(np.diff(time)))
     carried = replace(encoder, time=edges, angles=_shaped(angles))
     return CarriedAngles(carried, float(time[-1]), step, swing, noise)
 
@@ -143,7 +144,7 @@ def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> A
         Times that its log does not cover.
     """
     time = np.asarray(time, dtype=np.float64)
-    angles = encoder.angles if encoder.angles.ndim == 2 else encoder.angles[:, None]
+    angles = np.unwrap(encoder.angles if encoder.angles.ndim == 2 else encoder.angles[:, None], axis=0)
     if angles.shape[1] != len(axes) or not set(axes) <= set("xyz"):
         raise UsageError(
             f"axes {','.join(axes)} for {angles.shape[1]} angle(s) in {encoder.source}; expected one of x, y and z for each "
