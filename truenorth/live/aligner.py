@@ -32,6 +32,7 @@ from truenorth.estimate.gaps import LONGEST_BRIDGE
 from truenorth.live.answer import Answer, under_way
 from truenorth.live.feed import Feed
 from truenorth.live.feeds import GnssFeed
+from truenorth.live.felt import Felt, without_known
 from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
 from truenorth.live.known_feeds import FEEDS
@@ -42,7 +43,6 @@ from truenorth.live.reasons import reasons_of
 from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
 from truenorth.records import ImuRecord
-from truenorth.records.specified import in_time
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.track import Residuals
 
@@ -100,15 +100,16 @@ class Aligner:
             raise UsageError(f"share {share}; expected a part of one core above 0, at most 1")
         self.place = None if place is None else Position.of(place)
         self.imu: ImuSpec | None = None
-        late = 0.0
+        felt = Felt()
         if imu is not None:
-            self.imu, late = in_time(imu_spec(imu))
+            said = imu_spec(imu)
+            felt, self.imu = Felt(said, kind), without_known(said)
         self.method, self.share = method, share
         self.feeds = {feed.key: feed for feed in aid if isinstance(feed, Feed)}
         self.turner = next((a for a in aid if isinstance(a, Turner)), None)
         self.log = Log(kind, most_rows)
         self.on_taken(None)
-        self.intake = Intake(late)
+        self.intake = Intake(felt)
         self.onward = Onward(kind)
         self.failure = ""
         self.solutions = 0

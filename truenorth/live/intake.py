@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
+from truenorth.live.felt import Felt
 
 Array = NDArray[np.float64]
 
@@ -84,14 +85,12 @@ class Intake:
 
     Parameters
     ----------
-    late : float, s
-        By which the sensors are late, as their specification says; the stamps become earlier by it.
+    felt : Felt, optional
+        Takes off what a specification says of the rows: lags, by which stamps become earlier, and places of accelerometers.
     """
 
-    late = 0.0  # of a run that was kept before there were any
-
-    def __init__(self, late: float = 0.0) -> None:
-        self.late = late
+    def __init__(self, felt: Felt | None = None) -> None:
+        self.felt = felt or Felt()
         self.counts = Counts()
         self._newest = -np.inf
         self._recent: deque[Array] = deque()  # times of the blocks of the last `LATE` seconds
@@ -104,9 +103,9 @@ class Intake:
         ----------
         rows : (K, 7) array
         """
-        sound = self._sound(rows)
-        if self.late:
-            sound = sound - np.array([self.late, *np.zeros(6)])
+        return [self.felt.corrected(block) for block in self._sifted(self._sound(rows))]
+
+    def _sifted(self, sound: Array) -> list[Array]:
         if not len(sound):
             return []
         if not self._ahead and self._goes_on(sound[:, 0]):

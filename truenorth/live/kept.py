@@ -12,6 +12,7 @@ from truenorth.core.archive import read_archive, write_archive
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError
 from truenorth.live.carry import Carry
+from truenorth.live.felt import Felt
 from truenorth.live.going import Going
 from truenorth.live.intake import Intake
 from truenorth.live.known_feeds import FEEDS
@@ -20,7 +21,9 @@ from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.recent import Recent
 
-PLAIN: dict[str, type[Any]] = {kind.__name__: kind for kind in (Log, Intake, Past, Recent, Carry, Going, NoiseSeen)}
+PLAIN: dict[str, type[Any]] = {
+    kind.__name__: kind for kind in (Log, Intake, Felt, Past, Recent, Carry, Going, NoiseSeen)
+}
 PLAIN |= {kind.__name__: kind for kind in FEEDS.values()}  # type: ignore[misc]  # classes, called as functions
 
 

@@ -27,6 +27,7 @@ from truenorth.estimate.gaps import LONGEST_BRIDGE
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.answer import Answer, Motion
 from truenorth.live.feed import Feed
+from truenorth.live.felt import Felt, without_known
 from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
@@ -40,7 +41,6 @@ from truenorth.navigation.start import force_at_rest
 from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
-from truenorth.records.specified import in_time
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.layout import DP, DV
@@ -101,7 +101,7 @@ class Navigator:
         most_rows: int = MOST_ROWS,
     ) -> None:
         self.start, spec, self._imu_source = start_of(start, imu)
-        self.spec, late = in_time(spec)
+        felt, self.spec = Felt(spec, kind), without_known(spec)
         self._given, self._imu = start, imu
         self.solution = start if isinstance(start, Alignment) else None
         self.feeds = {feed.key: feed for feed in feeds if feed.navigates}
@@ -109,7 +109,7 @@ class Navigator:
         self.start = arm_as_begun(self.start, self._mountings.get(Gnss.key))
         dummies: dict[str, Aid] = {key: feed.aid_of(feed.dummy()) for key, feed in self.feeds.items()}
         self.altitude, self._why = kept_altitude(altitude, dummies)
-        self.intake, self.log = Intake(late), Log(kind, most_rows)
+        self.intake, self.log = Intake(felt), Log(kind, most_rows)
         self.output = output
         self.failure = ""
         self.past = Past()
@@ -136,7 +136,7 @@ class Navigator:
             Shapes that do not fit.
         """
         rows = as_rows(time, gyro, accel)
-        rows = rows[~(rows[:, 0] - self.intake.late <= self.start.time)]
+        rows = rows[~(rows[:, 0] - self.intake.felt.late <= self.start.time)]
         with self._lock:
             for block in self.intake.sift(rows):
                 if not self.log.add(block):
@@ -210,7 +210,7 @@ class Navigator:
                 self._given,
                 aid=list(aids.values()),
                 altitude=self._kept_with(aids),
-                imu=self.spec if self.intake.late else self._imu,
+                imu=self.spec if self.intake.felt.known else self._imu,
                 interval=FINE,
                 output=self.output,
             )

@@ -90,18 +90,6 @@ def epoch_felt(at: float, record: ImuRecord, spec: ImuSpec) -> float:
     return felt if felt < at <= last else at
 
 
-def in_time(spec: ImuSpec) -> tuple[ImuSpec, float]:
-    """For rows that come one by one: the specification without lags, and the larger of them, s, to take off the stamps.
-
-    What the lags of the two sensors differ by is left.
-    """
-    late = max(lag(spec, "gyro"), lag(spec, "accel"))
-    if late == 0.0:
-        return spec, late
-    whole = replace(spec, gyro_latency=0.0, gyro_bandwidth=math.inf, accel_latency=0.0, accel_bandwidth=math.inf)
-    return whole, late
-
-
 def _in_the_centre(record: ImuRecord, spec: ImuSpec) -> ImuRecord:
     """The record with the size effect of its accelerometers taken off."""
     if spec.accel_positions is None:
