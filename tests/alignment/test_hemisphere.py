@@ -15,8 +15,7 @@ from truenorth.core.position import Position
 from truenorth.state.limits import limit
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("bench", "run"), some([("swaying", 1), ("rotary", 0)], [("swaying", 2), ("rotary", 4)]))
+@pytest.mark.parametrize(("bench", "run"), some([("swaying", 1)], [("rotary", 0), ("swaying", 2), ("rotary", 4)]))
 def test_the_other_hemisphere_is_named_and_the_right_one_is_not(bench, run):
     """Of 10 draws of each the ratios were -20 to -180 at the right latitude, 22 to 160 at the wrong one."""
     inputs, _ = BENCHES[bench].draw(8301, run)
@@ -56,6 +55,7 @@ def hidden():
     return answers, kept, [[fine.misfit_at(place) for place in places] for fine in kept]
 
 
+@pytest.mark.slow
 def test_a_bend_that_a_fitted_motion_hides_is_found_by_aligning_anew(hidden):
     """Once silent: 15 sigmas of heading, by a ratio of 10 of the bend alone."""
     (sound, wrong), _, _ = hidden
@@ -82,6 +82,7 @@ def test_axes_of_a_swaying_imu_are_no_other_hemisphere():
     assert not any("hemisphere" in item.key for item in answer.evidence)
 
 
+@pytest.mark.slow
 def test_how_well_a_place_fits_depends_on_no_place_that_was_given(hidden):
     """A log has one likelihood in each hemisphere, whichever the answer was made in: the ratio changes its sign with the place."""
     _, _, ((here, there), by_the_other) = hidden
@@ -89,6 +90,7 @@ def test_how_well_a_place_fits_depends_on_no_place_that_was_given(hidden):
     assert there - here > limit("hemisphere refitted")
 
 
+@pytest.mark.slow
 def test_the_motion_is_fitted_until_it_settles(hidden):
     """One fit about the first answer leaves this log some hundred less likely than it is (twice the logarithm)."""
     _, fits, misfits = hidden

@@ -232,7 +232,7 @@ def test_driving_backwards():
 
 
 @pytest.mark.parametrize(
-    ("imu", "heading", "runs"), some([("industrial", 0.3, 2)], [("industrial", 0.3, 12), ("tactical", 0.1, 40)])
+    ("imu", "heading", "runs"), some([("industrial", 0.3, 1)], [("industrial", 0.3, 12), ("tactical", 0.1, 40)])
 )
 def test_gnss_from_an_unknown_heading(imu, heading, runs):
     """A van in town, 150 s, with the receiver that the filter supposes where nobody says more.

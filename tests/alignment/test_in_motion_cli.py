@@ -29,7 +29,7 @@ def call(*arguments):
 def test_align_and_go_on(files, tmp_path):
     log, odometer = files / "imu.csv", files / "odo.csv"
     common = ["--odometer", odometer, "--lat", 39.9, "--alt", 50, "--imu", "navigation"]
-    result = call("align", log, *common, "--to", 200, "-o", tmp_path / "start", "--json")
+    result = call("align", log, *common, "--to", 150, "-o", tmp_path / "start", "--json")
     assert result.exit_code == 0, result.output
     said = json.loads(result.stdout)
     assert said["status"] == "aligned"
@@ -40,7 +40,7 @@ def test_align_and_go_on(files, tmp_path):
         "navigate", log, "--start", tmp_path / "start", "--odometer", odometer, "--estimate", "scale", "--json"
     )
     assert track.exit_code == 0, track.output
-    printed = call("align", log, *common, "--to", 150)
+    printed = call("align", log, *common, "--to", 60)
     assert "heading of the vehicle" in printed.stdout
     assert "odometer: scale" in printed.stdout
     unplaced = call("align", log, "--odometer", odometer, "--imu", "navigation", "--to", 150, "--json")

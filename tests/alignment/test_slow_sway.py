@@ -57,7 +57,8 @@ def test_a_sway_that_is_not_slow_is_not_looked_at_again() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "run"), [("base leaves slowly", 4), ("accel bias step", 6), ("specification ten times too good", 6)]
+    ("fault", "run"),
+    some([("accel bias step", 6)], [("base leaves slowly", 4), ("specification ten times too good", 6)]),
 )
 def test_what_a_slow_oscillator_took_up_is_not_silent(fault: str, run: int) -> None:
     """By 4.6, 3.6 and 12.2 sigmas as first run: the fit of the sway explained all three."""

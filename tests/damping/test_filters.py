@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.damping.marine_case import DEG_PER_HOUR, HOUR, MICRO_G, ideal_and_truth
+from tests.runs import few_and_all
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
 from truenorth.damping.course import errors_of, linearised, without_errors
@@ -134,12 +135,12 @@ def test_the_prior_is_that_of_the_navigation():
     np.testing.assert_allclose(carried / scale, expected / scale, atol=0.01)
 
 
-def test_the_augmented_filter_is_honest():
-    """30 runs with errors, biases and log error drawn from what it is given; NEES of 450 numbers in its 99.9 % band.
+@few_and_all(30)
+def test_the_augmented_filter_is_honest(runs):
+    """Errors, biases and log error drawn from what it is given; NEES of fifteen numbers a run in its 99.9 % band.
 
     Full strapdown at 10 s over 24 h, its course re-linearised midway; ARW .001 deg/sqrt(h), VRW 10 ug/sqrt(Hz).
     """
-    runs = 30
     ideal, truth = ideal_and_truth(hours=24.0)
     model = MarineModel(**WALKS, groups=LogErrors(0.3).groups())
     P0 = carried_prior(truth, START, model, np.diag(SIGMA**2))

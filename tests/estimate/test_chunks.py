@@ -77,7 +77,7 @@ def assert_same(tracks, batch, size):
             np.testing.assert_array_equal(joined(parts, name), getattr(whole, name))
 
 
-@pytest.mark.parametrize("retimed", [False, True])
+@pytest.mark.parametrize("retimed", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_chunks_give_the_bits_of_one_batch(drive, retimed):
     """With a vertical loop, a lag, a pair of second order and measurements amid samples; the re-timed ones too."""
     record, start, fixes, baro = drive
