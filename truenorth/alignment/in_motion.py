@@ -22,6 +22,7 @@ from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
+from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
@@ -48,7 +49,7 @@ from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRec
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
-from truenorth.state.layout import DP
+from truenorth.state.layout import DP, PHI
 from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
@@ -64,6 +65,7 @@ PASSES, MORE_PASSES = 2, 6
 # One sigma of heading up to which axes of the gyros may be constants for the filter, a quarter of the bank's step: with no noise in
 # turns the products of a larger error with tilts, biases and axes pass for knowledge, and level was up to seven sigmas off.
 SURE = math.radians(7.5)
+SURELY = 3.0  # sigmas of heading, within which guesses of the bank are those of one track
 LOUD = 3.0  # times its sigma, that an aid is so noisy that the first pass begins anew with what it is
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2
@@ -184,7 +186,7 @@ def _aligned(
     if any(float(factor.max()) > LOUD for factor in louder.factors.values()):  # what it found was made of noise
         task = replace(task, factors=louder.factors)
         found, spread = _begun(task, method, tell)
-    first, number, much = found.guess, 1, False
+    first, bank, number, much = found.guess, spread, 1, False
     while number < passes or ((much or not found.settled) and passes > 1 and number < passes + MORE_PASSES):
         task, much = task.learnt(found.track)
         if number < passes or much or not found.settled:
@@ -203,17 +205,22 @@ def _aligned(
         task, found = _as_specified(task, found, first)
     if number > 1:
         spread = spread.and_more(found.used_twice, found.unsettled)
-    guess, track = found.guess, found.track
-    if method == "motion" and spread.and_more(found.sigma).heading > UNTOLD:
+    guess, track, last = found.guess, found.track, None
+    if method == "motion" and passes > 1 and has_fixes(task.gnss):
+        tell(f"pass {number + 1}")
+        last = open_track(task, first, track)
+    if last is not None:
+        spread = bank.beyond(SURELY * float(last.sigma[-1, PHI][2]))
+    elif method == "motion" and spread.and_more(found.sigma).heading > UNTOLD:
         task, guess, track = _by_gravity(task, guess, track, first)
-    answer = moving_answer(task, task.with_lasting_fixes(track), method, why, spread)
+    answer = moving_answer(task, task.with_lasting_fixes(last or track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
     more += learnt_evidence(task.factors, answer.moving.delays, task.scatter) if answer.moving is not None else []
     more += task.wanders
     more += _seen(task, track, guess, first, gated=passes > 1, gyrocompassed=method == "gyrocompass")
-    return judge_moving(answer, track, heading_limit, more)
+    return judge_moving(answer, last or track, heading_limit, more)
 
 
 def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[Pass, Spread]:

@@ -22,9 +22,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spread:
-    """(3, 3) second moment of phi besides the filter's, rad^2."""
+    """(3, 3) second moment of phi besides the filter's, rad^2, and of which guesses: (K, 3) phi and (K,) chance of each."""
 
     moment: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    phi: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    chance: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, attitudes: Sequence[Array], best: int, weight: Array) -> Spread:
@@ -33,7 +35,12 @@ class Spread:
         R = others @ C.T
         phi = np.cross(C[2], others[:, 2]) @ C.T  # of level alone, whatever heading
         phi[:, 2] = -np.arctan2(R[:, 1, 0] - R[:, 0, 1], R[:, 0, 0] + R[:, 1, 1])
-        return cls((weight[:, None] * phi).T @ phi)
+        return cls((weight[:, None] * phi).T @ phi, phi, weight)
+
+    def beyond(self, heading: float) -> Spread:
+        """Of guesses alone that are farther off in heading than this, rad: nearer ones are in the covariance of one track."""
+        far = np.abs(self.phi[:, 2]) > heading
+        return Spread((self.chance[far, None] * self.phi[far]).T @ self.phi[far], self.phi[far], self.chance[far])
 
     def and_more(self, *heading: float) -> Spread:
         """With further sigmas of heading, rad."""

@@ -1,0 +1,157 @@
+"""The last passes of an alignment by motion: open loops about the motion that the passes before have found.
+
+A vehicle that goes round in a steady circle feels the same force and the same rate all the time. Any attitude fits both, if the
+biases make up for it: ``C (f - nabla) = a - g``, ``C (w - eps) = w_n``. A closed loop corrects its attitude as it goes. With each
+correction of heading by ``h`` the columns of what is fixed to the body turn by ``h`` against those of north and east, and what
+nothing shows seems to be shown a little: the level of a consumer IMU was known to .6 deg where a bias of its gyros and of its
+accelerometers leave 1.2, and was up to five of these off. So the last passes feed nothing back. They are linear about the motion
+that the whole log leads back to, with its biases, axes, arm and delay, and with the *prior* covariance, whose heading is any. What
+lies between the prior's values and those is an error that is known at the start. That is Gauss and Newton's method on the log, and
+the prior counts once. Of a log longer than gyros carry an attitude, or than a place by dead reckoning stays near, the first part is
+open; then the loop is closed.
+
+Sources: as of :mod:`truenorth.alignment.transfer_nominal`, which does the same for a slave and its master.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.in_motion_passes import turn_between
+from truenorth.alignment.in_motion_start import Guess, backtracked, start_at
+from truenorth.alignment.in_motion_task import INTERVAL, OUTPUT, MovingTask
+from truenorth.alignment.transfer_nominal import carried_for
+from truenorth.core.attitude import UNIFORM_SIGMA, dcm_from_euler, dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.errors import DataError
+from truenorth.errors.axes import known_as_bias
+from truenorth.errors.model import InsModel
+from truenorth.estimate.batch import settle
+from truenorth.estimate.run import navigate_track, with_states
+from truenorth.state.layout import ACCEL_AXES, BA, BG, PHI
+from truenorth.state.state import Start
+from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
+
+SETTLED = 0.1  # of a sigma: a pass that moves the attitude by less is the last
+MOST = 12  # passes
+LONGEST = 300.0  # s of a loop that feeds nothing back: a poor IMU's place is then off by a kilometre
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """How the motion begins that a loop is linear about."""
+
+    C_nb: Array  # (3, 3) at the start
+    values: Array  # (n,) in the places of the states
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """An open loop, and how far off it found its motion to be."""
+
+    track: Track
+    end: Array  # (n,) errors of the motion, as led back to the start
+
+    @property
+    def moved(self) -> float:
+        """The largest of the attitude's in units of its sigma."""
+        return float(np.max(np.abs(self.end[PHI]) / self.track.sigma[-1, PHI]))
+
+
+class _Log:
+    """A log, and the motion that it is linear about: the loop does it row by row."""
+
+    def __init__(self, motion: _Motion) -> None:
+        self.motion = motion
+
+    def linearise(self) -> _Motion:
+        """The motion."""
+        return self.motion
+
+    def correct(self, x: Array) -> None:
+        """Take what was found off it."""
+        values = self.motion.values + x
+        values[PHI] = 0.0
+        self.motion = _Motion(np.asarray(dcm_from_rotation_vector(x[PHI]) @ self.motion.C_nb), values)
+
+
+def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
+    """The track of a loop that is linear about what a closed one has found.
+
+    Parameters
+    ----------
+    task : MovingTask
+    first : Guess
+        Where the first pass began: its level is the prior, of its heading nothing is known.
+    track : Track
+        Of the last closed loop.
+
+    Returns
+    -------
+    Track or None
+        None where it does not come to rest: no motion near the one found fits the log best.
+    """
+    used = task.aiding(gated=True)
+    if any(source.loop > 0.0 for source in used):
+        return None
+    model = with_states(task.model, used)
+    until = float(task.record.time[0]) + min(carried_for(task.record, model), LONGEST)
+
+    def once(motion: _Motion) -> _Pass:
+        start, level, P, values = _prior(task, first, motion, model)
+        off = values - motion.values
+        off[PHI] = rotation_vector_from_dcm(level @ motion.C_nb.T)
+        found = navigate_track(
+            task.record,
+            start,
+            model,
+            used,
+            interval=INTERVAL,
+            every=max(1, round(OUTPUT / INTERVAL)),
+            prior=(P, motion.values),
+            open_until=until,
+            off=off,
+        )
+        back = _led_back(task, model, found, until)
+        error = back.values - motion.values
+        error[PHI] = rotation_vector_from_dcm(back.C_nb @ motion.C_nb.T)
+        return _Pass(found, error)
+
+    try:
+        last = settle(
+            _Log(_led_back(task, model, track, until)), once, lambda each: each.moved, enough=SETTLED, most=MOST
+        )
+    except DataError:  # the filter broke down
+        return None
+    return last.found.track if last.moved < SETTLED else None
+
+
+def _led_back(task: MovingTask, model: InsModel, track: Track, until: float) -> _Motion:
+    """The motion that a track leads back to, from as late as the gyros carry an attitude; constants as the end knows them."""
+    row = max(1, int(np.searchsorted(track.time, until, side="right")))
+    values = np.zeros(model.states)
+    for part in (BG, BA):
+        values[part] = track.sensors[row - 1, part]
+    for group in model.groups:
+        had, own = track.layout.slice_of(group.name), model.layout.slice_of(group.name)
+        constant = np.isinf(group.lasts).all() and np.isinf(group.correlation_distance) and group.frequency == 0.0
+        if had is not None and own is not None and constant and group.walk == 0.0:
+            values[own] = track.sensors[-1, had]
+    return _Motion(backtracked(task.record, track[:row]), values)
+
+
+def _prior(task: MovingTask, first: Guess, motion: _Motion, model: InsModel) -> tuple[Start, Array, Array, Array]:
+    """Where the motion begins, the guess turned to its heading, covariance and values of all states before the log."""
+    any_heading = Guess(motion.C_nb, first.level_sigma, UNIFORM_SIGMA)
+    start = start_at(
+        task.record, any_heading, task.begin, task.spec, task.odometer, task.gnss, task.wheel, task.antenna
+    )
+    P, values = model.prior(start.P), np.zeros(model.states)
+    for group in model.groups:
+        if group.name == ACCEL_AXES:
+            P, values = known_as_bias(P, values, group, model.layout.first_of(ACCEL_AXES), None)
+    return start, dcm_from_euler(turn_between(first.C_nb, motion.C_nb), 0.0, 0.0) @ first.C_nb, P, values
