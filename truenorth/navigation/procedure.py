@@ -24,6 +24,7 @@ from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.poorer import growth_along, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
+from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.given import (
     arm_as_begun,
@@ -45,6 +46,7 @@ from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
+from truenorth.quality.height_drift import height_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
@@ -228,7 +230,7 @@ def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
     """What the measurements and the log show."""
     evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
     receiver = record_of(given, Gnss)
-    evidence += [] if receiver is None else gnss_evidence(receiver)
+    evidence += [] if receiver is None else gnss_evidence(receiver) + height_evidence(receiver)
     if "baro" in given and plan.altitude != "baro":
         evidence.append(note("height.barometer_unused", "use_barometer", altitude=plan.altitude))
     return evidence
@@ -260,6 +262,7 @@ def _rivals(
     usual = partial(again, plan.slow)
     without = [partial(again, less) for less in one_less(plan.slow)]
     found = noise_evidence(usual, track, plan.model, plan.record)
+    found += spike_evidence(of_record, track, plan.record)
 
     def of_another_course() -> list[Rival]:
         return warming_rivals(of_record, track, plan.record, spec) + poorer_rivals(track, others)
