@@ -80,8 +80,8 @@ RECENT = 60.0  # s: whose own motion of the base is that of the epoch
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
 TURNS_BLINDLY = (
-    "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis "
-    f"are fitted, nothing finds north{POSITIONS}"
+    "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis are fitted, "
+    f"nothing finds north{POSITIONS}"
 )
 TURNED = math.radians(30.0)  # less in a short log may be part of a sway
 
@@ -179,9 +179,8 @@ def align_base(
     evidence = weighed_by_heave(found.heave, evidence, task.record)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     answer = judged(answer, evidence, heading_limit)
-    if found.moved is None:
-        return answer
-    return replace(answer, disturbance=np.maximum(answer.disturbance, found.moved))
+    moved = found.moved
+    return answer if moved is None else replace(answer, disturbance=np.maximum(answer.disturbance, moved))
 
 
 @dataclass(frozen=True)

@@ -39,13 +39,12 @@ MOST = 0.1  # of the rows: more are no single ones
 def without_spikes(record: ImuRecord) -> tuple[ImuRecord, int]:
     """The record with spikes replaced by what their neighbours say, and how many there were."""
     rows = max(round(STRETCH / record.interval), 2 * HALF + 1)
-    count, mended = 0, {}
-    for name in ("gyro", "accel"):
-        values = getattr(record, name)
-        columns = [_mended(x, rows) for x in values.T]
-        count += sum(number for _, number in columns)
-        mended[name] = np.stack([x for x, _ in columns], axis=1)
-    return (record, 0) if count == 0 else (replace(record, **mended), count)
+    gyro, accel = ([_mended(x, rows) for x in sensor.T] for sensor in (record.gyro, record.accel))
+    count = sum(number for _, number in (*gyro, *accel))
+    if count == 0:
+        return record, 0
+    turns, forces = (np.stack([x for x, _ in sensor], axis=1) for sensor in (gyro, accel))
+    return replace(record, gyro=turns, accel=forces), count
 
 
 def _mended(values: Array, rows: int) -> tuple[Array, int]:

@@ -19,6 +19,7 @@ from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.height_drift import height_evidence
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.poorer import growth_along, poorer_rivals, poorer_tracks
@@ -46,7 +47,6 @@ from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
-from truenorth.quality.height_drift import height_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
@@ -230,7 +230,7 @@ def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
     """What the measurements and the log show."""
     evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
     receiver = record_of(given, Gnss)
-    evidence += [] if receiver is None else gnss_evidence(receiver) + height_evidence(receiver)
+    evidence += [] if receiver is None else gnss_evidence(receiver)
     if "baro" in given and plan.altitude != "baro":
         evidence.append(note("height.barometer_unused", "use_barometer", altitude=plan.altitude))
     return evidence
@@ -276,7 +276,7 @@ def _rivals(
 
 
 def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:
-    """Whether the receiver's velocity steps where the IMU's does not."""
+    """Whether the receiver's velocity steps where the IMU's does not, or its heights drift away from it."""
     receiver = given.get(Gnss.key)
     if not isinstance(receiver, Gnss):
         return []
@@ -286,7 +286,9 @@ def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) 
         return other.run(other.sources({**given, Gnss.key: replace(receiver, record=log)}), smooth=smooth)
 
     without = [partial(with_log, less) for less in one_less(plan.slow)]
-    return led_by_evidence(partial(with_log, plan.slow), track, receiver.record, without)
+    usual = partial(with_log, plan.slow)
+    found = led_by_evidence(usual, track, receiver.record, without)
+    return found if plan.altitude == "fixed" else found + height_evidence(usual, track, receiver.record, without)
 
 
 def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evidence]:

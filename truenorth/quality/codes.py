@@ -30,7 +30,7 @@ PART = 0.5  # of the rows that the hole should have, which must stand on the one
 
 
 class Pile(NamedTuple):
-    """One value with the rows of a hole beside it."""
+    """One value with the rows of a hole next to it."""
 
     value: float
     below: float  # width of the hole on its lower side, and on its upper one, in the channel's unit

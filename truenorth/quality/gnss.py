@@ -104,7 +104,7 @@ def turn_evidence(
     k = np.sum(p * np.conj(s)) / np.sum(np.abs(s) ** 2)
     if len(p) >= FEWEST and np.sum(np.abs(p - k * s) ** 2) > limit("turned as one") * np.sum(np.abs(p) ** 2):
         return [contradiction(f"{source}.velocity", "sensor_axes")]
-    cells = cell_means(stretch, time, at, k * whole, velocity)
+    cells = _cells(stretch, time, at, k * whole, velocity)
 
     def turn(part: slice) -> Turn | None:
         number, t, places, ways, rates = (x[part] for x in cells)
@@ -144,7 +144,7 @@ class Turn(NamedTuple):
     otherwise: float  # probability that the turn has the other sign
 
 
-def cell_means(stretch: NDArray[np.intp], *series: NDArray) -> tuple[NDArray, ...]:
+def _cells(stretch: NDArray[np.intp], *series: NDArray) -> tuple[NDArray, ...]:
     """Number of the stretch (M,), and means (M,) of series (N,), of at most about so many cells, none over a gap."""
     rows = max(1, math.ceil(len(stretch) / CELLS))
     edges = np.flatnonzero(np.diff(stretch, prepend=-1))
@@ -180,10 +180,7 @@ def _turn(
         return None
     X = X / (size := np.maximum(np.linalg.norm(X, axis=0), 1e-12))
     found = []
-    for walk in (
-        np.zeros((count, count)),
-        *(r * walk_covariance(time, stretch, lasts) for lasts in LASTING for r in RATIOS),
-    ):
+    for walk in (np.zeros((count, count)), *(r * _walk(time, stretch, lasts) for lasts in LASTING for r in RATIOS)):
         C = np.eye(count) + walk
         A, b, c = (np.concatenate([np.linalg.solve(C, half) for half in np.split(x, 2)]) for x in (X, y, slow))
         N = X.T @ A
@@ -215,7 +212,7 @@ def _turn(
     return Turn(angle, sigma, float(weights @ other))
 
 
-def walk_covariance(time: Array, stretch: NDArray[np.intp], lasts: float) -> Array:
+def _walk(time: Array, stretch: NDArray[np.intp], lasts: float) -> Array:
     """(M, M) covariance of the integral of errors that last so long (s), of variance one in a step; none over a gap."""
     first = np.searchsorted(stretch, stretch)
     since = time - time[first]

@@ -280,7 +280,7 @@ SENTENCES = {
         "base would wobble as the outer axis turns"
     ),
     "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
-    "gnss.height_drifts": "the GNSS heights drift by {size:.2g} m ({rate:+.2g} ± {sigma:.1g} m/s) against the velocities up",
+    "gnss.height_drifts": "the GNSS heights drift by {size:.2g} m against the velocities, {rate:+.2g} m/s (ratio {ratio:.0f})",
     "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
     "master.turned": (
         "the master's velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"

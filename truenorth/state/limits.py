@@ -206,9 +206,6 @@ LIMITS: dict[str, Limit] = {
     "turned velocities": Limit(
         1e-4, "1", "probability that a sound log shows a turn of its velocities, of either sign"
     ),
-    "height drifts": Limit(
-        1e-4, "1", "probability that heights of a sound log drift against its velocities, either way"
-    ),
     # ---- gyros against accelerometers and encoders
     "gyros right": Limit(
         0.05,
