@@ -41,6 +41,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.poorer import ALONE, poorer_evidence, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
+from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
@@ -302,6 +303,7 @@ def _seen(
     again = partial(_of_model, task, guess, gated)
     without = [partial(_of_model, less, guess, gated) for less in task.without_slow_errors()]
     found += noise_evidence(again, track, task.model, task.record)
+    found += spike_evidence(other, track, task.record)
 
     def of_another_imu(spec: ImuSpec) -> Track:
         return task.with_spec(spec).run(guess, gated=gated)

@@ -53,6 +53,7 @@ from truenorth.coarse.uncertainty import own_motion
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.staying import BA, BG, StaticModel, gained_velocity
+from truenorth.quality.codes import codes_evidence
 from truenorth.quality.density import specification_evidence
 from truenorth.quality.quantum import quantum_evidence
 from truenorth.quality.record_evidence import record_evidence
@@ -79,8 +80,8 @@ RECENT = 60.0  # s: whose own motion of the base is that of the epoch
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
 TURNS_BLINDLY = (
-    "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis "
-    f"are fitted, nothing finds north{POSITIONS}"
+    "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis are fitted, "
+    f"nothing finds north{POSITIONS}"
 )
 TURNED = math.radians(30.0)  # less in a short log may be part of a sway
 
@@ -170,7 +171,7 @@ def align_base(
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)
-    evidence += [] if sound else quantum_evidence(written, position.lat)
+    evidence += [] if sound else quantum_evidence(written, position.lat) + codes_evidence(written, position.lat)
     if method in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         known: dict[str, Any] = {"calibration": calibration, "heading_limit": heading_limit, "sound": sound}
         own = align_base(as_written, position, imu, at=at, progress=progress, **known)
@@ -178,9 +179,8 @@ def align_base(
     evidence = weighed_by_heave(found.heave, evidence, task.record)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     answer = judged(answer, evidence, heading_limit)
-    if found.moved is None:
-        return answer
-    return replace(answer, disturbance=np.maximum(answer.disturbance, found.moved))
+    moved = found.moved
+    return answer if moved is None else replace(answer, disturbance=np.maximum(answer.disturbance, moved))
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_erro
 from truenorth.errors.master import master_errors as errors_of
 from truenorth.estimate.rivals import likelihood_ratio, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
+from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.record_evidence import moving_evidence
@@ -223,6 +224,7 @@ def _rivals(
     warming = partial(warming_rivals, partial(run, model=model, start=start), track, part, spec)
     found = noise_evidence(other, track, model, part)
     found += wandering_evidence(other, track, model, spec, part.duration, warming=warming)
+    found += spike_evidence(partial(run, model=model, start=start), track, part)
     wide = _any_delay(start, model)
 
     def of_translation(track: Track) -> Track:

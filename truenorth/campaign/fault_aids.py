@@ -176,6 +176,11 @@ def _damaged_start(inputs: Inputs, rng: Rng) -> tuple[Inputs, str]:
     return inputs | {"start": replace(start, C_nb=start.C_nb[::-1])}, "rows reversed"
 
 
+def _height_drifts(log: GnssRecord, rng: Rng) -> tuple[GnssRecord, str]:
+    rise = either(rng, 3.0, 60.0)
+    return replace(log, alt=log.alt + rise * (log.time - log.time[0]) / log.duration), f"{rise:.1f} m"
+
+
 AID_FAULTS: tuple[Fault, ...] = (
     Fault("wrong latitude", "place", _latitude),
     Fault("wrong hemisphere", "place", _hemisphere),
@@ -189,6 +194,7 @@ AID_FAULTS: tuple[Fault, ...] = (
     of_log("GNSS clock rate", "gnss", clock_rate),
     of_log("another datum", "gnss", _datum),
     of_log("slowly spoofed", "gnss", _spoofed),
+    of_log("GNSS height drifts", "gnss", _height_drifts),
     of_log("GNSS velocity in another unit", "gnss", lambda log, rng: _speed_unit(log, rng, "v_n")),
     _wheel("odometer scale", lambda rng: 1.0 + either(rng, 0.05, 0.4)),
     _wheel("odometer reversed", lambda rng: -1.0),

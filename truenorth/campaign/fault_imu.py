@@ -258,6 +258,15 @@ def _leaving(inputs: Inputs, rng: Rng) -> tuple[Inputs, str]:
     return inputs | {"record": spoilt}, f"{speed:.3g} m/s from {begin:.2f} of the log on"
 
 
+def _spiked(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
+    """Single rows of an axis to one side, by 5 to 500 times the usual step from row to row."""
+    sensor, axis, count = ("gyro", "accel")[int(rng.integers(2))], _axis(rng), int(rng.integers(5, 200))
+    values = getattr(record, sensor).copy()
+    size = over_decades(rng, 5.0, 500.0) * float(np.median(np.abs(np.diff(values[:, axis], n=2))))
+    values[rng.integers(5, len(record) - 5, count), axis] += size
+    return replace(record, **{sensor: values}), f"{sensor} {'xyz'[axis]} {count} of {size:.3g}"
+
+
 RATE = math.radians(1.0) / 3600.0
 IMU_FAULTS: tuple[Fault, ...] = (
     _exchanged("gyro"),
@@ -289,5 +298,6 @@ IMU_FAULTS: tuple[Fault, ...] = (
     of_imu("dead sensor", lambda record, rng: _dead(record, rng, True)),
     of_imu("stuck sensor", lambda record, rng: _dead(record, rng, False)),
     of_imu("noisy for a while", _noisy),
+    of_imu("spikes", _spiked),
     Fault("base leaves slowly", "attitude", _leaving),
 )

@@ -19,11 +19,13 @@ from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.height_drift import height_evidence
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.poorer import growth_along, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
+from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.given import (
     arm_as_begun,
@@ -260,6 +262,7 @@ def _rivals(
     usual = partial(again, plan.slow)
     without = [partial(again, less) for less in one_less(plan.slow)]
     found = noise_evidence(usual, track, plan.model, plan.record)
+    found += spike_evidence(of_record, track, plan.record)
 
     def of_another_course() -> list[Rival]:
         return warming_rivals(of_record, track, plan.record, spec) + poorer_rivals(track, others)
@@ -273,7 +276,7 @@ def _rivals(
 
 
 def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:
-    """Whether the receiver's velocity steps where the IMU's does not."""
+    """Whether the receiver's velocity steps where the IMU's does not, or its heights drift away from it."""
     receiver = given.get(Gnss.key)
     if not isinstance(receiver, Gnss):
         return []
@@ -283,7 +286,9 @@ def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) 
         return other.run(other.sources({**given, Gnss.key: replace(receiver, record=log)}), smooth=smooth)
 
     without = [partial(with_log, less) for less in one_less(plan.slow)]
-    return led_by_evidence(partial(with_log, plan.slow), track, receiver.record, without)
+    usual = partial(with_log, plan.slow)
+    found = led_by_evidence(usual, track, receiver.record, without)
+    return found if plan.altitude == "fixed" else found + height_evidence(usual, track, receiver.record, without)
 
 
 def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evidence]:

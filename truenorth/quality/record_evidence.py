@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.quality.alternation import alternation_evidence
+from truenorth.quality.codes import codes_evidence
 from truenorth.quality.plausibility import unit_findings
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding, check_sampling
@@ -62,7 +63,7 @@ def record_evidence(
 
 def moving_evidence(record: ImuRecord) -> list[Evidence]:
     """Evidence of a record on the move; of noise for a while see :func:`truenorth.estimate.rivals.noise_evidence`."""
-    return vibration_evidence(record) + sampling_evidence(record, turns=True)
+    return vibration_evidence(record) + sampling_evidence(record, turns=True) + codes_evidence(record)
 
 
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:

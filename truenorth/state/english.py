@@ -206,6 +206,10 @@ SENTENCES = {
         "measurements better (as rare by chance as a likelihood ratio of {ratio:.0f}, a sound log gives {chance:.0f} at most); "
         "heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "rival.spikes": (
+        "{count} single rows of the IMU stand out of their neighbours; with those that these say the measurements fit as well "
+        "or better (likelihood ratio {ratio:.3g}); heading moves by {heading:angle}, level by {level:angle}"
+    ),
     "rival.poorer": (
         "an IMU {factor:.0f} times as poor as the specification fits the measurements as well (likelihood ratio {ratio:.3g}); "
         "heading moves by {heading:angle}, level by {level:angle}"
@@ -236,6 +240,7 @@ SENTENCES = {
         "{name} is written in steps of {step:.3g}, which hide its noise: its mean may be off by a part of a step; heading by "
         "{heading:angle}, level by {level:angle}"
     ),
+    "record.codes": "{name} is {value:.4g} in {rows} rows and no other from {from:.4g} to {to:.4g}: missing codes, or a dead band",
     "record.alternates": (
         "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
         "their mean is turned against either by {level:angle}"
@@ -275,6 +280,7 @@ SENTENCES = {
         "base would wobble as the outer axis turns"
     ),
     "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
+    "gnss.height_drifts": "the GNSS heights drift by {size:.2g} m against the velocities, {rate:+.2g} m/s (ratio {ratio:.0f})",
     "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
     "master.turned": (
         "the master's velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"

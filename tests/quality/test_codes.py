@@ -1,0 +1,63 @@
+"""Codes that a converter misses and dead bands: found where they are, with what they take, and not in sound sensors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truenorth.quality.codes import codes_evidence, piled_up
+from truenorth.records import ImuRecord
+
+ROWS = 6000
+
+
+def swung(rng):
+    """A sensor that swings and has noise."""
+    return np.sin(0.01 * np.arange(ROWS)) + 0.05 * rng.standard_normal(ROWS)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-3])
+def test_a_missing_code_is_found_where_it_is(step):
+    """Of values with many digits, and of counts."""
+    values = swung(np.random.default_rng(1))
+    values = step * np.round(values / step) if step else values
+    low, width = 0.3, 0.06
+    spoilt = np.where((values > low) & (values < low + width), low, values)
+    pile = piled_up(spoilt)
+    assert pile is not None
+    assert pile.value == pytest.approx(low, abs=1e-12)
+    assert pile.above == pytest.approx(width, abs=0.005)
+    assert pile.below < 0.01
+    assert pile.rows >= np.count_nonzero((values > low) & (values < low + width))
+
+
+def test_of_a_dead_band_the_turn_that_is_lost_is_within_what_is_said():
+    """Rates that pass slowly through a band that reads zero, on one side of it only."""
+    rng = np.random.default_rng(2)
+    rate = 0.03 + 0.3 * np.sin(0.01 * np.arange(ROWS)) + 0.002 * rng.standard_normal(ROWS)
+    dead = np.where(np.abs(rate) < 0.02, 0.0, rate)
+    time, other = 0.01 * np.arange(1.0, ROWS + 1.0), 0.01 * rng.standard_normal((ROWS, 3))
+    record = ImuRecord(time, np.column_stack([dead, other[:, :2]]), other + np.array([0.0, 0.0, 9.8]), "rates")
+    (found,) = codes_evidence(record)
+    assert found.figures["name"] == "gyro_x"
+    assert abs(np.sum(dead - rate)) * 0.01 < found.effect.level
+    at_rest = codes_evidence(record, 0.6)[0].effect
+    assert at_rest.level == 0.0 < at_rest.heading
+    assert codes_evidence(replace(record, gyro=other)) == []
+
+
+def test_sound_sensors_have_none():
+    """Noise, counts finer and coarser than it, counts rescaled so that every third is left out, a rate that is held and let go."""
+    rng = np.random.default_rng(3)
+    noise = swung(rng)
+    ramp = np.clip(np.abs(np.arange(ROWS) % 2000 - 1000) - 300.0, 0.0, 400.0) / 400.0
+    for values in (
+        rng.standard_normal(ROWS),
+        noise,
+        np.round(noise / 0.02) * 0.02,
+        np.round(noise / 0.2) * 0.2,
+        np.round(1.5 * np.round(noise / 0.002)) * 0.002,
+        ramp,
+        ramp + 1e-3 * rng.standard_normal(ROWS),
+    ):
+        assert piled_up(values) is None
