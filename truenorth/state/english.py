@@ -207,8 +207,9 @@ SENTENCES = {
         "heading moves by {heading:angle}, level by {level:angle}"
     ),
     "rival.spikes": (
-        "{count} single rows of the IMU stand out of their neighbours; with values between these neighbours instead "
-        "the measurements fit as well or better (likelihood ratio {ratio:.3g}); heading moves by {heading:angle}, level by {level:angle}"
+        "{count} single rows of the IMU stand out of their neighbours; with values between these neighbours instead the "
+        "measurements fit as well or better (likelihood ratio {ratio:.3g}); heading moves by {heading:angle}, "
+        "level by {level:angle}"
     ),
     "rival.poorer": (
         "an IMU {factor:.0f} times as poor as the specification fits the measurements as well (likelihood ratio {ratio:.3g}); "
