@@ -89,6 +89,8 @@ class Intake:
         Takes off what a specification says of the rows: lags, by which stamps become earlier, and places of accelerometers.
     """
 
+    felt = Felt()  # of a run that was kept before there were any
+
     def __init__(self, felt: Felt | None = None) -> None:
         self.felt = felt or Felt()
         self.counts = Counts()
