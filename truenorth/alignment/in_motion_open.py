@@ -28,7 +28,7 @@ from truenorth.core.attitude import UNIFORM_SIGMA, dcm_from_euler, dcm_from_rota
 from truenorth.core.errors import DataError
 from truenorth.errors.axes import known_as_bias
 from truenorth.errors.model import InsModel
-from truenorth.estimate.batch import settle
+from truenorth.estimate.batch import moved_by, settle
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.state.layout import ACCEL_AXES, BA, BG, PHI
 from truenorth.state.state import Start
@@ -36,7 +36,8 @@ from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-SETTLED = 0.1  # of a sigma: a pass that moves the attitude by less is the last
+SETTLED = 0.1  # of a sigma: a pass that moves attitude, arms and delays by less is the last
+SITS = (" lag", " lever arm")  # groups of each aid
 MOST = 12  # passes
 LONGEST = 300.0  # s of a loop that feeds nothing back: a poor IMU's place is then off by a kilometre
 
@@ -58,8 +59,8 @@ class _Pass:
 
     @property
     def moved(self) -> float:
-        """The largest of the attitude's in units of its sigma."""
-        return float(np.max(np.abs(self.end[PHI]) / self.track.sigma[-1, PHI]))
+        """The largest of attitude, arms and delays in units of its sigma."""
+        return moved_by(self.end, self.track, [name for name in self.track.layout.names if name.endswith(SITS)])
 
 
 class _Log:

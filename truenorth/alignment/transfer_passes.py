@@ -28,12 +28,11 @@ from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_
 from truenorth.alignment.transfer_rows import by_rows
 from truenorth.alignment.transfer_smoothed import LONGEST, flatter_along
 from truenorth.errors.master import ARM, DELAY, FILTER, MOUNTING, TransferModel
-from truenorth.estimate.batch import settle
+from truenorth.estimate.batch import moved_by, settle
 from truenorth.estimate.memory import REOPENED, USED
 from truenorth.quality.stamps import scattered, stamp_scatter
 from truenorth.quality.whiteness import whiteness
 from truenorth.records import ImuRecord, MasterRecord
-from truenorth.state.layout import PHI
 from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
@@ -69,11 +68,7 @@ class _Pass:
     @property
     def moved(self) -> float:
         """The largest of attitude, arm, delay and seat in units of its sigma."""
-        layout, sigma = self.track.layout, self.track.sigma[-1]
-        parts = (PHI, *(part for name in (DELAY, ARM, MOUNTING) if (part := layout.slice_of(name)) is not None))
-        known = np.concatenate([np.arange(part.start, part.stop) for part in parts])
-        known = known[sigma[known] > 0.0]
-        return float(np.max(np.abs(self.end[known]) / sigma[known]))
+        return moved_by(self.end, self.track, (DELAY, ARM, MOUNTING))
 
 
 class _Log:

@@ -8,7 +8,7 @@ sways, an indexer, a turntable, and the filters of the rotary paper (whose measu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.filters import Estimates, LinearSystem
+from truenorth.state.layout import PHI
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -133,6 +135,25 @@ def settle(
         before, last, end = by, end, share * end
         del found  # a pass takes memory: none of it stays for the next
         log.correct(end)
+
+
+def moved_by(end: Array, track: Track, names: Iterable[str]) -> float:
+    """The largest error of attitude and some groups, in units of its sigma at the end of a track.
+
+    Parameters
+    ----------
+    end : (n,) array
+        Errors of the nominal solution.
+    track : Track
+        That a filter has found them by.
+    names : iterable of str
+        Groups of its layout; one that it has not is passed over, and so is what is known.
+    """
+    sigma = track.sigma[-1]
+    parts = (PHI, *(part for name in names if (part := track.layout.slice_of(name)) is not None))
+    open_ = np.concatenate([np.arange(part.start, part.stop) for part in parts])
+    open_ = open_[sigma[open_] > 0.0]
+    return float(np.max(np.abs(end[open_]) / sigma[open_]))
 
 
 def _likeness(a: Array, b: Array) -> float:
