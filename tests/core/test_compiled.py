@@ -7,11 +7,14 @@ import os
 import pkgutil
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 import truenorth
+from truenorth.core.compiled import compiled
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
 from truenorth.core.kernel_folder import prune
 from truenorth.core.kernel_source import KernelSource
@@ -302,3 +305,21 @@ def test_what_was_unused_longest_goes_first(tmp_path):
     assert not left.exists()
     prune(tmp_path, 400)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["k-0.kernel", "k-1.kernel", "k-2.kernel"]
+
+
+@pytest.mark.parametrize("name", ["dispatcher", "inner"])
+def test_threads_that_call_a_kernel_for_the_first_time_share_one_dispatcher(name, monkeypatch):
+    kernel = compiled(lambda x: x)
+    together = threading.Barrier(4)
+
+    def slowly(*_):
+        time.sleep(0.05)
+        return object()
+
+    def ask(_):
+        together.wait()
+        return getattr(kernel, name)
+
+    monkeypatch.setattr(kernel, "_dispatcher", slowly)
+    with ThreadPoolExecutor(4) as threads:
+        assert len(set(threads.map(ask, range(4)))) == 1

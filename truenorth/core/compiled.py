@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeVar
@@ -21,6 +22,22 @@ class Found(NamedTuple):
 
     cache_hits: dict[Any, int]
     cache_misses: dict[Any, int]
+
+
+class made_once(cached_property):  # noqa: N801 (a decorator)
+    """As :class:`functools.cached_property`, made by one thread only.
+
+    Since Python 3.12 that one lets several threads make a value each, of which the last stays: a kernel that threads call for the
+    first time had several dispatchers of Numba, and what one had compiled was looked for in another.
+    """
+
+    def __init__(self, func: Callable[[Any], Any]) -> None:
+        super().__init__(func)
+        self.making = threading.RLock()  # of this name alone: what is made under it may wait for Numba's own lock
+
+    def __get__(self, instance: Any, owner: Any = None) -> Any:
+        with self.making:
+            return super().__get__(instance, owner)
 
 
 class Kernel(KernelSource):
@@ -63,14 +80,14 @@ class Kernel(KernelSource):
         """The name of the file of machine code; none for calls that leave out arguments."""
         return ready.name_of(self.py_func, self.options, arguments) if len(arguments) == self._count else None
 
-    @cached_property
+    @made_once
     def dispatcher(self) -> Any:
         """Numba's own, for calls from Python."""
         from truenorth.core.inner_library import SteadyCompiler
 
         return self._dispatcher(self.options, SteadyCompiler)
 
-    @cached_property
+    @made_once
     def inner(self) -> Any:
         """Numba's own, for calls from other kernels."""
         from truenorth.core.inner_library import InnerCompiler
@@ -184,7 +201,7 @@ class Callback(KernelSource):
         """Call the Python function."""
         return self.py_func(*arguments)
 
-    @cached_property
+    @made_once
     def compiled(self) -> Any:
         """Numba's own, which kernels take as an argument."""
         import numba.experimental.function_type  # noqa: F401 (it registers the type)
@@ -198,7 +215,7 @@ class Callback(KernelSource):
         callback.compile()
         return callback
 
-    @cached_property
+    @made_once
     def address(self) -> int:
         """Where the compiled function stands in this process; this object must live on."""
         name = ready.name_of(self.py_func, self.options | {"callback": self.signature}, ())

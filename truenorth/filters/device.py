@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array
 from truenorth.filters.drive import part
 from truenorth.filters.recursion import SOUND, Histories
 from truenorth.filters.shared import shares
@@ -119,9 +120,7 @@ def _blocks(runs: Runs, epochs: int, joseph: bool, out: Histories, gains: Any) -
 
 
 def _sent(runs: Runs) -> Any:
-    from numba import cuda
-
-    return Runs(*(cuda.to_device(a) for a in runs))
+    return Runs(*map(_to_device, runs))
 
 
 def _room(out: Histories) -> Any:
@@ -130,16 +129,26 @@ def _room(out: Histories) -> Any:
 
     begun = ("log_likelihood", "failure")
     return Histories(
-        **{k: cuda.to_device(a) if k in begun else cuda.device_array_like(a) for k, a in out._asdict().items()}
+        **{k: _to_device(a) if k in begun else cuda.device_array(a.shape, a.dtype) for k, a in out._asdict().items()}
     )
+
+
+def _to_device(a: Array) -> Any:
+    """A copy on the device, in C order.
+
+    An axis of one element may have stride 0 (a view of what all runs share): Numba then takes the array for a broadcast one and
+    counts its pieces in Python, which took five times as long as the filter. A flat view has no such axis.
+    """
+    from numba import cuda
+
+    return cuda.to_device(np.ascontiguousarray(a).reshape(-1).reshape(a.shape))
 
 
 def _launch(kernel: Any, blocks: int, threads: int, *arguments: Any) -> None:
     """Call a kernel; that few blocks leave most of a device idle, as Numba warns, is known: the covariance of all is one."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Grid size")
-        configured = kernel[blocks, threads]
-    configured(*arguments)
+        warnings.filterwarnings("ignore", ".*Grid size")
+        kernel[blocks, threads](*arguments)
 
 
 def _fetch(there: Any, here: Histories) -> None:
