@@ -1,6 +1,7 @@
 """Many runs of the Kalman filter on a CUDA device and on this processor: the same result first, then the time of each.
 
-15 states, 3 rows at every step; systems of their own (a block of threads a run), and runs that share the covariance (a thread).
+15 states (and as many as an alignment on the move has), 3 rows at every step; systems of their own (a block of threads a run),
+and runs that share the covariance (a thread).
 Times are on the clock, transfers included. Run: ``python -m benchmarks cuda``.
 """
 
@@ -12,19 +13,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.bench_filters import system
+from benchmarks.bench_filters import STATES, system
 from benchmarks.timing import best
 from truenorth.core.errors import UsageError
 from truenorth.filters import LinearSystem, kalman
 
 EPOCHS, REPEATS = 500, 3
-APART, SHARED = (100, 1000, 5000), (1000, 10_000, 100_000)
+APART, MANY, SHARED = (100, 1000, 5000), (100, 1000), (1000, 10_000, 100_000)
+ON_THE_MOVE = 37  # states
 TOLERANCE = 1e-10
 
 
-def of_its_own(runs: int) -> LinearSystem:
+def of_its_own(runs: int, states: int = STATES) -> LinearSystem:
     """Each run its own transition."""
-    many = system(EPOCHS, (runs,), every=1)
+    many = system(EPOCHS, (runs,), every=1, states=states)
     scale = 1.0 - 0.01 * np.random.default_rng(1).uniform(size=(runs, 1, 1, 1))
     return replace(many, Phi=scale * many.Phi)
 
@@ -41,6 +43,7 @@ def main() -> None:
     print(f"  {'us a step and run':28}{'runs':>8}{f'{cores} cores':>10}{'device':>10}{'ratio':>8}{'apart':>10}")
     for title, sizes, make in (
         ("systems of their own", APART, of_its_own),
+        (f"the same, {ON_THE_MOVE} states", MANY, lambda runs: of_its_own(runs, ON_THE_MOVE)),
         ("covariance shared", SHARED, lambda runs: system(EPOCHS, (runs,), every=1)),
     ):
         for runs in sizes:

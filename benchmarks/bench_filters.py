@@ -24,21 +24,23 @@ LIMIT_ONE, LIMIT_EIGHT, LIMIT_MANY, CORES = (
 )  # us: of the plain form, one run, 8 runs, and 200 on two cores
 
 
-def system(epochs: int, runs: tuple[int, ...] = (), every: int = EVERY, seed: int = 0) -> LinearSystem:
+def system(
+    epochs: int, runs: tuple[int, ...] = (), every: int = EVERY, seed: int = 0, states: int = STATES
+) -> LinearSystem:
     """A stable system without structure."""
     rng = np.random.default_rng(seed)
-    Phi = np.eye(STATES) + 0.01 * rng.standard_normal((STATES, STATES))
+    Phi = np.eye(states) + 0.01 * rng.standard_normal((states, states))
     Phi /= 1.001 * np.max(np.abs(np.linalg.eigvals(Phi)))
     z = rng.standard_normal((*runs, epochs, ROWS))
     z[..., np.arange(epochs) % every != 0, :] = np.nan
     return LinearSystem(
         Phi=Phi[None],
-        Q=0.01 * np.eye(STATES)[None],
-        H=rng.standard_normal((1, ROWS, STATES)),
+        Q=0.01 * np.eye(states)[None],
+        H=rng.standard_normal((1, ROWS, states)),
         R=np.diag([0.5, 1.0, 2.0])[None],
         z=z,
-        x0=np.zeros(STATES),
-        P0=np.eye(STATES),
+        x0=np.zeros(states),
+        P0=np.eye(states),
     )
 
 

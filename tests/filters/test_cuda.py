@@ -41,7 +41,7 @@ def test_where_there_is_none_it_says_so(monkeypatch):
     monkeypatch.setattr(device, "_fault", lambda n, m: "there is no CUDA device here")
     with pytest.raises(UsageError, match='device is "cuda", but there is no CUDA device here'):
         kalman(system, device="cuda")
-    monkeypatch.setattr(device, "WORTH", 0)
+    monkeypatch.setattr(device, "SAVED", 0)
     monkeypatch.setattr(device, "FEWEST", 1)
     assert np.array_equal(kalman(system, device="auto").x, kalman(system).x)
 
@@ -64,8 +64,9 @@ def test_auto_takes_a_device_for_large_work_of_many_runs(monkeypatch):
     monkeypatch.setattr(device, "_fault", lambda n, m: "")
     few, many = (random_system(15, 3, 2, (runs,)) for runs in (2, 200))
     assert not device.on_cuda("auto", many)
-    monkeypatch.setattr(device, "WORTH", 1e4)
+    monkeypatch.setattr(device, "SAVED", 1e4)
     assert device.on_cuda("auto", many)
+    assert not device.on_cuda("auto", many, workers=100)
     assert not device.on_cuda("auto", few)
     assert not device.on_cuda("cpu", many)
 

@@ -35,6 +35,7 @@ class Shared(NamedTuple):
     Phi: Any  # (n, n)
     T: Any  # (n, n), worked in
     a: Any  # (n,) covariance of a row with the state
+    k: Any  # (n,) its gain
     t: Any  # (n,), worked in
     largest: Any  # (n,) variance of each state so far
     R: Any  # (m, m)
@@ -45,7 +46,7 @@ class Shared(NamedTuple):
 
 def shared_bytes(n: int, m: int) -> int:
     """Of :class:`Shared`."""
-    return 8 * (3 * n * n + 4 * n + m * m + m * n + 2 * m)
+    return 8 * (3 * n * n + 5 * n + m * m + m * n + 2 * m)
 
 
 @cuda.jit(device=True)
@@ -165,23 +166,25 @@ def _update(w, h, row, nu, variance, h_s, correlated, joseph):
     """Condition on one row: ``P -= a a' / variance``, the rest as :func:`truenorth.filters.recursion.update_by_row`."""
     me, wide, n, m = cuda.threadIdx.x, cuda.blockDim.x, w.x.shape[0], w.R.shape[0]
     elements = (n + 1) // 2 * (n + n % 2 + 1)
+    for i in range(me, n, wide):  # once: to divide takes a device as long as ten products
+        w.k[i] = w.a[i] / variance
+        w.x[i] += w.k[i] * nu
+    cuda.syncthreads()
     for e in range(me, elements, wide):
         i, j = _lower(e, n)
         if i < n:
-            left = w.P[i, j] - w.a[i] * w.a[j] / variance
+            left = w.P[i, j] - w.k[i] * w.a[j]
             w.P[i, j] = left
             w.P[j, i] = left
-    for i in range(me, n, wide):
-        w.x[i] += w.a[i] / variance * nu
     cuda.syncthreads()
     if joseph:
         for i in range(me, n, wide):
-            w.t[i] = _dot(w.P[i], h) + (w.S_t[row, i] - w.a[i] / variance * (h_s + w.R[row, row]))
+            w.t[i] = _dot(w.P[i], h) + (w.S_t[row, i] - w.k[i] * (h_s + w.R[row, row]))
         cuda.syncthreads()
         for e in range(me, elements, wide):
             i, j = _lower(e, n)
             if i < n:
-                left = w.P[i, j] - 0.5 * (w.t[i] * (w.a[j] / variance) + w.t[j] * (w.a[i] / variance))
+                left = w.P[i, j] - 0.5 * (w.t[i] * w.k[j] + w.t[j] * w.k[i])
                 w.P[i, j] = left
                 w.P[j, i] = left
     if correlated:
@@ -191,7 +194,7 @@ def _update(w, h, row, nu, variance, h_s, correlated, joseph):
         for i in range(row + 1 + me, m, wide):
             w.v[i] += w.g[i] / variance * nu
             for j in range(n):
-                w.S_t[i, j] -= w.a[j] / variance * w.g[i]
+                w.S_t[i, j] -= w.k[j] * w.g[i]
             for j in range(row + 1, m):
                 w.R[i, j] -= w.g[i] * w.g[j] / variance
     cuda.syncthreads()
@@ -346,13 +349,14 @@ def run_by_block(n: int, m: int) -> Any:
         Phi = cuda.shared.array((n, n), float64)
         T = cuda.shared.array((n, n), float64)
         a = cuda.shared.array((n,), float64)
+        k = cuda.shared.array((n,), float64)
         t = cuda.shared.array((n,), float64)
         largest = cuda.shared.array((n,), float64)
         R = cuda.shared.array((m, m), float64)
         S_t = cuda.shared.array((m, n), float64)
         v = cuda.shared.array((m,), float64)
         g = cuda.shared.array((m,), float64)
-        w = Shared(x, P, Phi, T, a, t, largest, R, S_t, v, g)
+        w = Shared(x, P, Phi, T, a, k, t, largest, R, S_t, v, g)
         _filter(w, system, cuda.blockIdx.x, epochs, tied, joseph, out, gains)
 
     return kernel

@@ -17,16 +17,19 @@ from truenorth.filters.system import LinearSystem, Runs, runs_of
 Device = Literal["cpu", "cuda", "auto"]
 
 FEWEST = 100  # runs: a device has about as many multiprocessors, and a block keeps one of them busy
-WORTH = 1.5e11  # multiplications: 10 s of a core, what the first call takes to compile its kernels
+SAVED = (
+    1.5e11  # multiplications, 10 s of a core, that it must save: the first call takes as long to compile its kernels
+)
+CORES = {"own": 60.0, "shared": 10.0}  # that an H200 stands for: by itself, and by what it waits for its memory
 BLOCK_BYTES = 48 * 1024  # what the threads of a block share, on every device
 SHARE = 0.8  # of the device's free memory
 THREADS = 64  # of a block, where a thread is a run
 WARP = 32  # threads that go together
-EACH = 8  # elements of a covariance to a thread, where a block is a run
+EACH = 32  # elements of a covariance to a thread, where a block is a run: few threads wait less for one another
 
 
-def on_cuda(device: Device, system: LinearSystem) -> bool:
-    """Whether the runs go to a CUDA device; "auto" takes it where there is one and the work is large enough.
+def on_cuda(device: Device, system: LinearSystem, workers: int = 1) -> bool:
+    """Whether the runs go to a CUDA device; "auto" takes it where there is one that saves time against so many threads.
 
     Raises
     ------
@@ -35,7 +38,7 @@ def on_cuda(device: Device, system: LinearSystem) -> bool:
     """
     if device not in get_args(Device):
         raise UsageError(f'device is {device!r}, expected "cpu", "cuda" or "auto"')
-    if device == "cpu" or (device == "auto" and not _worth(system)):
+    if device == "cpu" or (device == "auto" and not _worth(system, workers)):
         return False
     fault = _fault(system.states, system.rows)
     if fault and device == "cuda":
@@ -43,14 +46,15 @@ def on_cuda(device: Device, system: LinearSystem) -> bool:
     return not fault
 
 
-def _worth(system: LinearSystem) -> bool:
+def _worth(system: LinearSystem, workers: int) -> bool:
     n, m, epochs = system.states, system.rows, system.epochs
     count = int(np.prod(system.runs, dtype=int))
     if count < FEWEST:
         return False
     of_state, of_covariance = n * n + 2 * m * n, 1.5 * n**3 + 3 * m * n * n
     once = shares(runs_of(system, system.runs), count, epochs)
-    return count * epochs * (of_state if once else of_state + of_covariance) > WORTH
+    work = count * epochs * (of_state if once else of_state + of_covariance)
+    return work * (1.0 / max(workers, 1) - 1.0 / CORES["shared" if once else "own"]) > SAVED
 
 
 def _fault(n: int, m: int) -> str:

@@ -168,7 +168,7 @@ def run_linear(
 
     `joseph` is of the Kalman filter alone, by whose covariance runs that share a system can go together, and so is `device`.
     """
-    there = joseph is not None and on_cuda(device, system)
+    there = joseph is not None and on_cuda(device, system, running.get("workers", 1))
     if there:
         running["workers"] = min(1, running.get("workers", 1))  # threads would only wait for one another
 
