@@ -132,3 +132,19 @@ def test_an_acceleration_without_gravity_is_no_increment(tmp_path):
         read_imu(tmp_path / "a.csv", units={"gyro": "rad/s"})
     android(tmp_path / "b.csv", ("acc", "gyroscope"), 0.2 * accel, 0.2 * gyro)  # a name that tells nothing: increments
     assert read_imu(tmp_path / "b.csv", units={"gyro": "rad"}).kind == "increments"
+
+
+@pytest.mark.parametrize(
+    ("platform", "standardised", "sign"),
+    [("ios", "false", -1.0), ("ios", "", -1.0), ("ios", "true", 1.0), ("android", "false", 1.0)],
+)
+def test_an_iphone_has_the_other_signs_where_its_app_says_so(platform, standardised, sign, tmp_path):
+    gyro, accel = tilted(TIME)
+    phone(tmp_path / "Gyroscope.csv", TIME, gyro)
+    phone(tmp_path / "TotalAcceleration.csv", TIME, sign * accel)
+    (tmp_path / "Metadata.csv").write_text(
+        f"version,device name,platform,standardisation\n3,mine,{platform},{standardised}\n"
+    )
+    record = read_imu(tmp_path)
+    np.testing.assert_allclose(record.accel, accel, atol=1e-8)
+    assert ("signs of TotalAcceleration.csv turned" in str(record.taken_for)) == (sign < 0.0)

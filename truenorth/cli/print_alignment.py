@@ -143,7 +143,8 @@ def print_transfer(console: Console, transfer: Transfer) -> None:
 
     s = transfer.summary()
     delay = said("", s["delay_ms"], s["delay_sigma_ms"], s["delay_estimated"]).strip()
-    console.print(f"{_('delay, ms')}: {delay}", soft_wrap=True)
+    name = _("delay, ms")
+    console.print(f"{name}: {delay}", soft_wrap=True)
     for title, key, unit, names, blind in (
         (_("lever arm, m"), "lever_arm", "m", (_("right"), _("forward"), _("up")), ("attitude",)),
         (

@@ -21,11 +21,12 @@ from truenorth.formats.aiding import (
 from truenorth.formats.detect import FORMATS, SUFFIXES, format_of
 from truenorth.formats.gnss import read_gnss
 from truenorth.formats.guesses import UnsureError, write_layout
-from truenorth.formats.layout import layout_for
+from truenorth.formats.layout import Layout, layout_for
 from truenorth.formats.opening import columns_of
 from truenorth.formats.poses import read_master, read_trajectory
 from truenorth.formats.table import record_of
 from truenorth.formats.writing import write_imu, write_record
+from truenorth.formats.zipped import unpacked
 from truenorth.records import ImuRecord
 
 __all__ = [
@@ -73,7 +74,8 @@ def read_imu(
     Parameters
     ----------
     path : path
-        A file, which may be packed (gzip, zstd, bzip2, lz4), or the folder of a ROS 2 bag.
+        A file, which may be packed (gzip, zstd, bzip2, lz4), a folder (a ROS 2 bag, one file for each sensor), or a zip archive of
+        such a folder.
     format : str, optional
         One of `FORMATS`, or of a plug-in; by suffix and content when left out.
     units : str or mapping, optional
@@ -114,19 +116,23 @@ def read_imu(
         if (own := _plugged(path, format)) is not None:
             plugged: ImuRecord = own(path, layout_for(path, given))
             return plugged
-        chosen = format_of(path, format)
-        layout = layout_for(path, given)
-        if chosen in devices.DEVICES:
-            layout = replace(layout, axes=layout.axes or devices.module_of(chosen).AXES)
-            return record_of(devices.columns(path, chosen, "imu", layout.topic), layout)
-        if chosen not in READERS:
-            return record_of(columns_of(path, chosen), layout)
-        module, function = READERS[chosen]
-        reader = getattr(import_module(f"truenorth.formats.{module}"), function)
-        record: ImuRecord = reader(path, layout)
-        return record
+        with unpacked(path) as log:
+            return _read(log, format, layout_for(path, given))
     except OSError as error:
         raise unreadable(path, error) from None
+
+
+def _read(path: Path, format: str | None, layout: Layout) -> ImuRecord:
+    chosen = format_of(path, format)
+    if chosen in devices.DEVICES:
+        layout = replace(layout, axes=layout.axes or devices.module_of(chosen).AXES)
+        return record_of(devices.columns(path, chosen, "imu", layout.topic), layout)
+    if chosen not in READERS:
+        return record_of(columns_of(path, chosen), layout)
+    module, function = READERS[chosen]
+    reader = getattr(import_module(f"truenorth.formats.{module}"), function)
+    record: ImuRecord = reader(path, layout)
+    return record
 
 
 def _plugged(path: Path, format: str | None) -> Callable[..., ImuRecord] | None:

@@ -109,7 +109,10 @@ def format_of(
     chosen = given or by_content or suffixes.get(suffix_of(path)) or found
     foreign = next((what for beginning, what in FOREIGN.items() if head.startswith(beginning)), None)
     if found == "npz" and not _is_npz(path):
-        found, foreign = None, "a zip archive, such as an Excel workbook; save its sheet as CSV, or unpack it"
+        found, foreign = (
+            None,
+            "a zip archive without one log in it (of an Excel workbook save the sheet as CSV); unpack it",
+        )
     if foreign is not None and not (chosen == "kf-gins-binary" and len(head) % 56 == 0):
         raise DataError(f"{path.name}: holds {foreign}")
     if chosen is None and b"\0" not in head and "csv" in formats:

@@ -15,6 +15,7 @@ from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
 from truenorth.formats.phone import PHONE, accuracies, speed_and_bearing
 from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Quantity
+from truenorth.formats.zipped import of_folder, unpacked
 from truenorth.records import GnssRecord
 
 Array = NDArray[np.float64]
@@ -78,7 +79,8 @@ def read_gnss(
     """Read the log of a GNSS receiver.
 
     A table of named columns, NMEA 0183 (GGA, RMC, VTG, HDT, THS), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's log
-    (u-blox, Septentrio, NovAtel, VectorNav, PX4, ArduPilot, an Android phone, ROS, KITTI).
+    (u-blox, Septentrio, NovAtel, VectorNav, PX4, ArduPilot, an Android phone, ROS, KITTI). Of a folder of sensors, or a zip archive
+    of one, as phones write them, the file ``Location.csv`` or ``GPS.csv``.
 
     Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,
     up`` (or ``down``) from an `origin`; velocity as ``VE, VN, VU`` (or ``VD``), ``ecef_vx, ecef_vy, ecef_vz``, or ``speed`` and
@@ -117,7 +119,9 @@ def read_gnss(
     except OSError as error:
         raise unreadable(path, error) from None
     given = {"columns": columns, "units": units, "topic": topic}
-    found, _ = open_log(path, "csv" if format == "kf-gins" else format, QUANTITIES, given, "gnss")
+    with unpacked(path, "gnss") as log:
+        file = of_folder(log, "gnss")
+        found, _ = open_log(file, "csv" if format == "kf-gins" else format, QUANTITIES, given, "gnss")
     values = _geodetic(found) or _earth_fixed(found) or _local(found, origin)
     track, turned = _velocity(found), _heading(found)
     if not values and track is None and not turned:

@@ -8,8 +8,10 @@ other. The rows are the gyros'; accelerometers that were sampled at other times 
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +28,7 @@ from truenorth.formats.units import split
 Array = NDArray[np.float64]
 
 SUFFIXES = (".csv", ".txt", ".tsv")
+METADATA = "Metadata.csv"  # of the app Sensor Logger
 GYRO = re.compile(r"gyro(?:scope|s)?(?:_?(?:meter|data|readings?|calibrated|uncalibrated))?(?:_?\d+)?")
 ACCEL = re.compile(
     r"(?:total_?)?acc(?:el(?:eration|erometer|erometers|s)?)?(?:_?(?:data|readings?|calibrated|uncalibrated))?(?:_?\d+)?"
@@ -33,6 +36,7 @@ ACCEL = re.compile(
 WITHOUT_GRAVITY = re.compile(r"(?:lin(?:ear)?|user)_?acc(?:el(?:eration|erometer)?)?(?:_?\d+)?")
 GRAVITY = re.compile(r"gravity(?:_?\d+)?")
 CLOCK = re.compile(r"time(?:_?stamps?)?")
+GNSS = re.compile(r"(?:location|gps|gnss)(?:_?(?:gps|gnss|fused|data|location))?(?:_?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -46,9 +50,16 @@ class _Sensor:
 
 
 def files_of(folder: Path) -> dict[str, list[Path]]:
-    """Files by what their names say: ``gyro``, ``accel``, ``gravity``, ``linear`` (without gravity) and ``clock``."""
+    """Files by what their names say: ``gyro``, ``accel``, ``gravity``, ``linear`` (without gravity), ``clock`` and ``gnss``."""
     found: dict[str, list[Path]] = {}
-    patterns = {"gyro": GYRO, "accel": ACCEL, "linear": WITHOUT_GRAVITY, "gravity": GRAVITY, "clock": CLOCK}
+    patterns = {
+        "gyro": GYRO,
+        "accel": ACCEL,
+        "linear": WITHOUT_GRAVITY,
+        "gravity": GRAVITY,
+        "clock": CLOCK,
+        "gnss": GNSS,
+    }
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() not in SUFFIXES or not path.is_file():
             continue
@@ -101,14 +112,15 @@ def columns(folder: Path) -> Columns:
         )
     if not rows.any():
         raise DataError(f"{folder.name}: {gyro.name} and {accel.name} have no time in common by their column {clock}")
-    force = accel.values if clock not in accel.clocks else at_times(times[rows], accel.clocks[clock], accel.values)
+    values, signs = _specific_force(folder, accel)
+    force = values if clock not in accel.clocks else at_times(times[rows], accel.clocks[clock], values)
     table = {clock: times[rows]} if clock else {}
     table |= dict(zip(gyro.headings, gyro.values[rows].T)) | dict(zip(accel.headings, force.T))
     left = f", {len(times) - rows.sum()} rows of one of them alone left out" if not rows.all() else ""
     merged = columns_of_arrays(folder, table)
     moved = clock in accel.clocks and not _same(times[rows], accel.clocks[clock])
     moved_words = "; accelerometers interpolated to them, which takes some of their white noise away" if moved else ""
-    note = f"{gyro.name} and {accel.name}, rows of the gyros{left}{moved_words}"
+    note = f"{gyro.name} and {accel.name}, rows of the gyros{left}{moved_words}{signs}"
     return Columns(folder, merged.names, merged.read, merged.column, named=True, notes=(note,), whole=merged.whole)
 
 
@@ -179,6 +191,28 @@ def _accel(folder: Path, files: dict[str, list[Path]], clock: str) -> _Sensor:
         f"{folder.name}: {sensor.name} shows {level:.3g} (median of the norm), which is gravity in no usual unit: the phone took "
         "gravity out; expected the specific force: record the total acceleration, or gravity in a file of its own"
     )
+
+
+def _specific_force(folder: Path, accel: _Sensor) -> tuple[Array, str]:
+    """Accelerations in Android's signs, and what was done, in words: Apple's are opposite, so that at rest they point down.
+
+    No log shows which of the two it has: a phone that lies on its screen looks alike. Sensor Logger writes it into a file.
+    Source: https://github.com/tszheichoi/awesome-sensor-logger, COORDINATES.md and README.md.
+    """
+    path = folder / METADATA
+    about = dict.fromkeys(("platform", "standardisation"), "")
+    if path.is_file():
+        with path.open(newline="", encoding="utf-8", errors="replace") as file, suppress(csv.Error):  # a cell without an end
+            row = next(csv.DictReader(file), {})
+            about |= {plain(key): (value or "").strip().casefold() for key, value in row.items() if key}
+    if about["platform"] == "ios" and about["standardisation"] != "true":
+        return (
+            -accel.values,
+            f"; signs of {accel.name} turned: {METADATA} says ios, whose accelerations point down at rest",
+        )
+    if not about["platform"] and " + " in accel.name:  # Android writes the sum as well
+        return accel.values, "; signs as on Android: those of an iPhone are opposite, which its log does not show"
+    return accel.values, ""
 
 
 def at_times(times: Array, clock: Array, values: Array) -> Array:
