@@ -166,8 +166,7 @@ def align_base(
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     moves = None if math.isfinite(found.way) and _explained(task.motion, found) else task.motion.moves_at
-    biased = math.sqrt(float(answer.imu.bias_variance[3:].max()))
-    evidence = record_evidence(written, task.motion, sound=sound, accel_bias=biased) + leaves(moves)
+    evidence = record_evidence(written, task.motion, sound=sound, imu=answer.imu) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)

@@ -216,13 +216,13 @@ def _of_encoder(
     record: ImuRecord, encoder: EncoderRecord | None, axes: Sequence[str], task: Task, spec: ImuSpec
 ) -> list[Evidence]:
     """What the encoder's angles and the record say against each other."""
-    gyro_bias, accel_bias = (math.sqrt(float(spec.bias_variance[part].max())) for part in (slice(0, 3), slice(3, 6)))
     if encoder is None:
-        return record_evidence(record, task.motion, accel_bias=accel_bias)
+        return record_evidence(record, task.motion, imu=spec)
+    gyro_bias = math.sqrt(float(spec.bias_variance[:3].max()))
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
     given = readings.pop("given")
     found = encoder_evidence(record, given, readings, gyro_bias)
-    found += record_evidence(record, task.motion, given, accel_bias=accel_bias)
+    found += record_evidence(record, task.motion, given, imu=spec)
     found += codes_evidence(record, task.position.lat)
     if len(axes) == 2:
         outer, inner = np.abs(np.diff(np.unwrap(encoder.angles, axis=0)[[0, -1]], axis=0)[0])

@@ -67,6 +67,14 @@ def _half_turned(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     return replace(record, gyro=record.gyro * turn), "gyro x and y"
 
 
+def _turned_axes(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
+    """Gyros whose block is turned against the accelerometers' by .3 to 3 deg about any axis."""
+    angle, way = over_decades(rng, 0.3, 3.0), rng.standard_normal(3)
+    way /= np.linalg.norm(way)
+    turned = record.gyro @ dcm_from_rotation_vector(math.radians(angle) * way).T
+    return replace(record, gyro=turned), f"{angle:.2f} deg about {way[0]:+.2f} {way[1]:+.2f} {way[2]:+.2f}"
+
+
 # -------------------------------------------------------------------------------------------------------- clock and rows
 
 
@@ -274,6 +282,7 @@ IMU_FAULTS: tuple[Fault, ...] = (
     _scaled("gyro sign", "gyro", lambda rng: -1.0),
     _scaled("accel sign", "accel", lambda rng: -1.0),
     of_imu("half a turn", _half_turned),
+    of_imu("gyro axes turned", _turned_axes),
     _scaled("gyro scale", "gyro", lambda rng: 1.0 + either(rng, 0.02, 0.3)),
     _scaled("accel scale", "accel", lambda rng: 1.0 + either(rng, 0.02, 0.3)),
     _unit("gyro", {"deg/s": math.degrees(1.0), "deg/h": math.degrees(3600.0), "mrad/s": 1e3, "rad a row": 0.02}),

@@ -202,7 +202,10 @@ def _specific_force(folder: Path, accel: _Sensor) -> tuple[Array, str]:
     path = folder / METADATA
     about = dict.fromkeys(("platform", "standardisation"), "")
     if path.is_file():
-        with path.open(newline="", encoding="utf-8", errors="replace") as file, suppress(csv.Error):  # a cell without an end
+        with (
+            path.open(newline="", encoding="utf-8", errors="replace") as file,
+            suppress(csv.Error),
+        ):  # a cell without an end
             row = next(csv.DictReader(file), {})
             about |= {plain(key): (value or "").strip().casefold() for key, value in row.items() if key}
     if about["platform"] == "ios" and about["standardisation"] != "true":

@@ -16,6 +16,7 @@ from truenorth.quality.sampling import Finding, check_sampling
 from truenorth.quality.tilt import check_tilt
 from truenorth.quality.vibration import vibration_evidence
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, contradiction, note
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ def record_evidence(
     C_sb: Callable[[Array], Array] | None = None,
     *,
     sound: bool = False,
-    accel_bias: float = 0.0,
+    imu: ImuSpec | None = None,
 ) -> list[Evidence]:
     """Evidence of a record on a base that stays where it is.
 
@@ -44,8 +45,8 @@ def record_evidence(
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
     sound : bool
         Whether clock, logging and range are known to be without fault, and the units and axes of the gyros.
-    accel_bias : float, m/s^2
-        One sigma: where the IMU turns it passes for gravity that turns.
+    imu : ImuSpec, optional
+        Its accelerometers' biases pass for gravity that turns where the IMU does; its axes may be off by as much as it says.
     """
     found = [] if sound else sampling_evidence(record, turns=motion.overall not in QUIET)
     doubts = unit_findings(record, motion, gyros=not sound)
@@ -57,7 +58,9 @@ def record_evidence(
     if quiet:  # its attitude is a mean, not integrated to the last row
         return found
     found += vibration_evidence(record)
-    tilt = check_tilt(record, C_sb, accel_bias)
+    accel_bias = 0.0 if imu is None else math.sqrt(float(imu.bias_variance[3:].max()))
+    misaligned = 0.0 if imu is None else math.hypot(imu.gyro_misalignment, imu.accel_misalignment)
+    tilt = check_tilt(record, C_sb, accel_bias, misaligned)
     return found if tilt is None else found + tilt.evidence()
 
 

@@ -24,9 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.student import student_limit
+from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import GRAVITY_EQUATOR
-from truenorth.quality.pushed import NO_PUSH, Push, push_in_step
-from truenorth.quality.tilt_bench import TiltBench, shifted
+from truenorth.quality.pushed import NO_PUSH, Push, push_in_step, push_of_other_pieces
+from truenorth.quality.tilt_bench import NOT_TURNED, AxesTurned, TiltBench, shifted
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
 from truenorth.state.limits import limit
@@ -37,6 +38,11 @@ Array = NDArray[np.float64]
 CELL = 0.1  # s, over which rates and forces are averaged
 PIECE = 20.0  # s, of a constant and a slope: biases and the earth turn gravity by less than a straight line
 MOST_TIME = 160.0  # s of a log that are looked at: its middle
+TURNED_TIME = (
+    600.0  # s that are looked at for axes turned about the vertical: a small swing behind the base's own motion
+)
+SURE_OF_AXES = 3.0  # sigmas of the specification's misalignment, which turned axes must exceed
+SAME_UP = 0.9  # of gravity, that its mean in a piece is: an IMU that is turned over has no one vertical
 LEAST_TURN = math.radians(0.3)  # rad, RMS of the turns in a piece: below it nothing is said
 SHIFTS = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)  # s, by which gyros may be late, tried with the columns as given
 IDENTITY = "+x +y +z"
@@ -73,6 +79,12 @@ class Tilt:
         all along.
     pushed : Push
         Of a rough base: what goes with its tilt and is no delay.
+    axes_turned : AxesTurned
+        By which the gyros' axes are turned against the accelerometers'.
+    indexed : bool
+        Whether an indexer turns the IMU over, so that turned axes show about each of them.
+    misaligned : float, rad
+        One sigma of the axes, by the specification; 0 where it says nothing.
     """
 
     given: float
@@ -90,6 +102,9 @@ class Tilt:
     by_axis_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     turn: float = 0.0
     pushed: Push = NO_PUSH
+    axes_turned: AxesTurned = NOT_TURNED
+    indexed: bool = False
+    misaligned: float = 0.0
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -124,7 +139,25 @@ class Tilt:
             size = float(off[i] * self.turned[i])
             figures = {"axis": "xyz"[i], "scale": float(self.scale[i]), "sigma": float(self.scale_sigma[i])}
             found.append(Evidence("tilt.scale", figures, "bounded", Effect(heading=size, level=size), ("units",)))
-        return found
+        return found + self._turned_axes()
+
+    def _turned_axes(self) -> list[Evidence]:
+        """Gyros whose axes are turned find another north by as much, and on an indexer another level."""
+        turn = self.axes_turned
+        least = SURE_OF_AXES * self.misaligned or limit("scale factor")
+        clear, hint = (student_limit(limit(chance), turn.pieces - 1) for chance in ("clear delay", "hint of a delay"))
+        tested, sigmas = (
+            (turn.angles, turn.sigmas) if self.indexed else (np.array([turn.alone]), np.array([turn.alone_sigma]))
+        )
+        if not np.any(np.abs(tested) >= np.maximum(least, hint * sigmas)):
+            return []
+        size, sigma = abs(float(turn.angles[0])), float(turn.sigmas[0])
+        if self.indexed:
+            size, sigma = float(np.linalg.norm(turn.angles)), float(np.max(turn.sigmas))
+        certain = bool(np.any(np.abs(tested) >= clear * sigmas))
+        effect = Effect(heading=max(abs(turn.alone), math.hypot(size, sigma)), level=size if self.indexed else 0.0)
+        figures: dict[str, Figure] = {"turn": size, "sigma": sigma}
+        return [Evidence("tilt.turned", figures, "bounded" if certain else "hint", effect, ("imu_axes",))]
 
     @property
     def rough(self) -> bool:
@@ -143,7 +176,9 @@ class Tilt:
         return bool(np.count_nonzero(shown) > 1)
 
 
-def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, accel_bias: float = 0.0) -> Tilt | None:
+def check_tilt(
+    record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, accel_bias: float = 0.0, misaligned: float = 0.0
+) -> Tilt | None:
     """Try all readings of the gyros on the middle of a record.
 
     Parameters
@@ -152,6 +187,8 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
     accel_bias : float, m/s^2
         One sigma.
+    misaligned : float, rad
+        One sigma of the axes of one sensor against the other's; 0 where nothing is said.
 
     Returns
     -------
@@ -213,7 +250,39 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
     turn = abs(late) * bench.rate_up(theta)
     pushed = push_in_step(bench, theta, shifted(theta, late / interval)) if may_be_pushed else NO_PUSH
     one_delay = given, unturned, best, axes, late, float(sigma[0]), tilt
-    return Tilt(*one_delay, scale, sigma_scale, turns, len(theta), *each, turn, pushed)
+    axes_turned = _axes_turned(_cells(record, TURNED_TIME) or cells, C_sb, accel_bias)
+    return Tilt(
+        *one_delay,
+        scale,
+        sigma_scale,
+        turns,
+        len(theta),
+        *each,
+        turn,
+        pushed,
+        axes_turned,
+        C_sb is not None,
+        misaligned,
+    )
+
+
+def _axes_turned(
+    cells: tuple[Array, Array, float, Array], C_sb: Callable[[Array], Array] | None, accel_bias: float
+) -> AxesTurned:
+    """Turn of the gyros' axes; none where an IMU is turned over by what says no angles, or where a push is there as well."""
+    theta, force, interval, middle = cells
+    if C_sb is not None:
+        return TiltBench(force, interval, C_sb(middle.ravel()).reshape(*middle.shape, 3, 3), accel_bias).turned(theta)
+    up = force.mean(axis=1)
+    if np.any(np.linalg.norm(up, axis=1) < SAME_UP * np.mean(np.linalg.norm(force, axis=2))):
+        return NOT_TURNED
+    bench = TiltBench(force, interval, None, accel_bias)
+    found = bench.turned(theta)
+    if abs(found.alone) >= student_limit(limit("hint of a delay"), len(theta) - 1) * found.alone_sigma:
+        right = theta @ dcm_from_rotation_vector(-found.alone * found.axes[0]).T
+        if push_of_other_pieces(bench, theta, right) > limit("pushed in other pieces"):
+            return NOT_TURNED
+    return found
 
 
 def least_scale(turned: Array) -> Array:
@@ -248,10 +317,10 @@ def whole_cells(record: ImuRecord) -> tuple[Array, float, Array]:
     return dtheta, interval, 0.5 * (time[:, 0] - record.interval + time[:, -1])
 
 
-def _cells(record: ImuRecord) -> tuple[Array, Array, float, Array] | None:
+def _cells(record: ImuRecord, most: float = MOST_TIME) -> tuple[Array, Array, float, Array] | None:
     """Turns (rad) and mean specific forces (m/s^2) of even cells of the record's middle, by pieces (P, L, 3), and their times."""
     middle = 0.5 * (record.time[0] + record.time[-1])
-    first, last = np.searchsorted(record.time, [middle - 0.5 * MOST_TIME, middle + 0.5 * MOST_TIME])
+    first, last = np.searchsorted(record.time, [middle - 0.5 * most, middle + 0.5 * most])
     rows = max(1, round(CELL / record.interval))
     interval = rows * record.interval
     length = round(PIECE / interval)
