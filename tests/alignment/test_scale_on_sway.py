@@ -72,4 +72,4 @@ def test_a_tremble_that_rows_hardly_sample_says_nothing_of_a_scale_factor(freque
     t = np.arange(1, 2001) / rate
     gyro = np.outer(np.cos(2.0 * np.pi * frequency * t), [1e-3, 2e-3, 0.0])
     record = ImuRecord(t, gyro, np.tile([0.0, 0.0, 9.8], (len(t), 1)))
-    assert scale_on_sway._hardly_sampled(record) is hardly
+    assert scale_on_sway.hardly_sampled(record) is hardly

@@ -37,6 +37,7 @@ from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align, usual_sway
 from truenorth.alignment.swung_bias import swung_biases
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
+from truenorth.alignment.turned_on_sway import turned_on_sway_evidence
 from truenorth.alignment.turning import (
     infer_turning,
     rocks_all_along,
@@ -335,12 +336,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
         about, anew = start._replace(C_n0_i=fine.C_n0_i), usual_sway if fine.slow_arm is None else sway_align
-        steps += scale_on_sway_evidence(
-            fine, task.record, lambda record: anew(about._replace(record=record), turned=turned, axes=spec)
-        )
+        again = lambda record: anew(about._replace(record=record), turned=turned, axes=spec)  # noqa: E731
+        steps += scale_on_sway_evidence(fine, task.record, again)
+        steps += turned_on_sway_evidence(fine, task.record, used, again)
     way = farthest(fine, task.position) if swung else math.inf
-    moved = _moves_on(task, fine) if swung else None
-    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, moved)
+    left = _moves_on(task, fine) if swung else None
+    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, left)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:

@@ -77,7 +77,7 @@ LIKE_MOTION = (
 # A turn that lags is another heading while it lasts; straight and level flight shows a master by velocity no heading.
 LATE = ("late gyros", "gyros late by a filter")
 SIGNS = ("gyro sign",)
-LIKE_HEADING = ("gyro scale",)  # that act on a base at rest as another heading does, to first order
+LIKE_HEADING = ("gyro scale", "gyro axes turned")  # that act on a base at rest as another heading does, to first order
 
 
 class Unseen(NamedTuple):

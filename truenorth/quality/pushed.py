@@ -13,9 +13,6 @@ squares that the delay explains, of late gyros on swaying ships and gondolas 0 t
 
 So it is with scale factors: gyros that turn too far leave nothing that goes with the tilt once they are put right, a push does.
 
-Gyros that are turned against the accelerometers about the vertical leave gravity swinging across the way of the tilt. A push across
-does the same, but not alone: one piece of the log is asked what the others say of it.
-
 A push of the same shape as a delay hides one, or makes one seem: no record of gyros and accelerometers tells the two apart. Where a
 push is there, a delay is in sigma, with all that it may have hidden, and refuses no log.
 """
@@ -64,38 +61,8 @@ def push_in_step(bench: TiltBench, theta: Array, right: Array) -> Push:
     return Push(share, math.sqrt(1.5 * given / theta.size))
 
 
-def push_of_other_pieces(bench: TiltBench, theta: Array, right: Array) -> float:
-    """What a push beyond `right` explains of each piece as the others show it, by what `right` explains in the same way.
-
-    A base's own motion in a few tones goes with the tilt of any piece by chance, and goes otherwise in the next. What lasts is a
-    push, or gyros that are wrong. Infinite where `right` explains nothing that lasts. Parameters as of :func:`push_in_step`.
-    """
-    arm, push = slice(1, 4), slice(1, None)
-    as_given, put_right = _level(bench, theta), _level(bench, right)
-    left = _left_of_each(put_right, arm)
-    explained = _left_of_each(as_given, arm) - left
-    return max(left - _left_of_each(put_right, push), 0.0) / explained if explained > 0.0 else math.inf
-
-
-def _left_of_each(pieces: Array, part: slice) -> float:
-    """Squares of the level force (column 0 of (P, N, c)) that columns leave, of each piece by the fit to all others."""
-    size = np.maximum(np.linalg.norm(pieces, axis=(0, 1)), 1e-12)
-    y, A = pieces[..., 0], (pieces / size)[..., part]
-    squares, products = np.swapaxes(A, 1, 2) @ A, (np.swapaxes(A, 1, 2) @ y[..., None])[..., 0]
-    inverse = np.linalg.pinv(squares.sum(axis=0) - squares, rcond=1e-9, hermitian=True)
-    fitted = (inverse @ (products.sum(axis=0) - products)[..., None])[..., 0]
-    return float(np.sum((y - (A @ fitted[..., None])[..., 0]) ** 2))
-
-
 def _left(bench: TiltBench, theta: Array) -> tuple[float, float]:
     """Squares of the level force that the gyros and an arm leave, and that a push in step with the tilt leaves as well."""
-    level = _level(bench, theta)
-    level = level.reshape(-1, level.shape[2])
-    return squares_left(level[:, 0], level[:, 1:4]), squares_left(level[:, 0], level[:, 1:])
-
-
-def _level(bench: TiltBench, theta: Array) -> Array:
-    """(P, 2 L, 16) level force of each piece, an arm's three columns and the twelve of a push in step with the tilt."""
     flat, C = bench.carried(theta)
     up = np.mean(C @ bench.force[..., None], axis=1)[..., 0]
     up /= np.linalg.norm(up, axis=1, keepdims=True)
@@ -112,8 +79,8 @@ def _level(bench: TiltBench, theta: Array) -> Array:
     ]
     known = flat.reshape(*theta.shape, 4)
     all_of = np.concatenate([known, np.stack(columns, axis=3)], axis=3)
-    level = np.stack([np.einsum("plic,pi->plc", all_of, axis) for axis in (x, y)], axis=2)
-    return np.asarray(level.reshape(len(theta), -1, all_of.shape[3]))
+    level = np.stack([np.einsum("plic,pi->plc", all_of, axis) for axis in (x, y)], axis=2).reshape(-1, all_of.shape[3])
+    return squares_left(level[:, 0], level[:, 1:4]), squares_left(level[:, 0], level[:, 1:])
 
 
 def _level_axes(up: Array) -> tuple[Array, Array]:

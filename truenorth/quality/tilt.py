@@ -17,17 +17,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.student import student_limit
-from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import GRAVITY_EQUATOR
-from truenorth.quality.pushed import NO_PUSH, Push, push_in_step, push_of_other_pieces
-from truenorth.quality.tilt_bench import NOT_TURNED, AxesTurned, TiltBench, shifted
+from truenorth.quality.pushed import NO_PUSH, Push, push_in_step
+from truenorth.quality.tilt_bench import TiltBench, shifted
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
 from truenorth.state.limits import limit
@@ -38,11 +37,7 @@ Array = NDArray[np.float64]
 CELL = 0.1  # s, over which rates and forces are averaged
 PIECE = 20.0  # s, of a constant and a slope: biases and the earth turn gravity by less than a straight line
 MOST_TIME = 160.0  # s of a log that are looked at: its middle
-TURNED_TIME = (
-    600.0  # s that are looked at for axes turned about the vertical: a small swing behind the base's own motion
-)
 SURE_OF_AXES = 3.0  # sigmas of the specification's misalignment, which turned axes must exceed
-SAME_UP = 0.9  # of gravity, that its mean in a piece is: an IMU that is turned over has no one vertical
 LEAST_TURN = math.radians(0.3)  # rad, RMS of the turns in a piece: below it nothing is said
 SHIFTS = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)  # s, by which gyros may be late, tried with the columns as given
 IDENTITY = "+x +y +z"
@@ -79,10 +74,8 @@ class Tilt:
         all along.
     pushed : Push
         Of a rough base: what goes with its tilt and is no delay.
-    axes_turned : AxesTurned
-        By which the gyros' axes are turned against the accelerometers'.
-    indexed : bool
-        Whether an indexer turns the IMU over, so that turned axes show about each of them.
+    axes_turned, axes_turned_sigma : (3,) arrays, rad
+        By which the gyros' axes are turned against the accelerometers' of an IMU that an indexer turns over, and its one-sigmas.
     misaligned : float, rad
         One sigma of the axes, by the specification; 0 where it says nothing.
     """
@@ -102,8 +95,8 @@ class Tilt:
     by_axis_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     turn: float = 0.0
     pushed: Push = NO_PUSH
-    axes_turned: AxesTurned = NOT_TURNED
-    indexed: bool = False
+    axes_turned: Array = field(default_factory=lambda: np.zeros(3))
+    axes_turned_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     misaligned: float = 0.0
 
     def evidence(self) -> list[Evidence]:
@@ -142,22 +135,14 @@ class Tilt:
         return found + self._turned_axes()
 
     def _turned_axes(self) -> list[Evidence]:
-        """Gyros whose axes are turned find another north by as much, and on an indexer another level."""
-        turn = self.axes_turned
+        """Gyros whose axes are turned find another north and another level by as much."""
         least = SURE_OF_AXES * self.misaligned or limit("scale factor")
-        clear, hint = (student_limit(limit(chance), turn.pieces - 1) for chance in ("clear delay", "hint of a delay"))
-        tested, sigmas = (
-            (turn.angles, turn.sigmas) if self.indexed else (np.array([turn.alone]), np.array([turn.alone_sigma]))
-        )
-        if not np.any(np.abs(tested) >= np.maximum(least, hint * sigmas)):
+        clear = student_limit(limit("clear delay"), self.pieces - 1)
+        if not np.any(np.abs(self.axes_turned) >= np.maximum(least, clear * self.axes_turned_sigma)):
             return []
-        size, sigma = abs(float(turn.angles[0])), float(turn.sigmas[0])
-        if self.indexed:
-            size, sigma = float(np.linalg.norm(turn.angles)), float(np.max(turn.sigmas))
-        certain = bool(np.any(np.abs(tested) >= clear * sigmas))
-        effect = Effect(heading=max(abs(turn.alone), math.hypot(size, sigma)), level=size if self.indexed else 0.0)
-        figures: dict[str, Figure] = {"turn": size, "sigma": sigma}
-        return [Evidence("tilt.turned", figures, "bounded" if certain else "hint", effect, ("imu_axes",))]
+        size = float(np.linalg.norm(self.axes_turned))
+        figures: dict[str, Figure] = {"turn": size, "sigma": float(np.max(self.axes_turned_sigma))}
+        return [Evidence("tilt.turned", figures, "bounded", Effect(heading=size, level=size), ("imu_axes",))]
 
     @property
     def rough(self) -> bool:
@@ -250,39 +235,11 @@ def check_tilt(
     turn = abs(late) * bench.rate_up(theta)
     pushed = push_in_step(bench, theta, shifted(theta, late / interval)) if may_be_pushed else NO_PUSH
     one_delay = given, unturned, best, axes, late, float(sigma[0]), tilt
-    axes_turned = _axes_turned(_cells(record, TURNED_TIME) or cells, C_sb, accel_bias)
-    return Tilt(
-        *one_delay,
-        scale,
-        sigma_scale,
-        turns,
-        len(theta),
-        *each,
-        turn,
-        pushed,
-        axes_turned,
-        C_sb is not None,
-        misaligned,
-    )
-
-
-def _axes_turned(
-    cells: tuple[Array, Array, float, Array], C_sb: Callable[[Array], Array] | None, accel_bias: float
-) -> AxesTurned:
-    """Turn of the gyros' axes; none where an IMU is turned over by what says no angles, or where a push is there as well."""
-    theta, force, interval, middle = cells
-    if C_sb is not None:
-        return TiltBench(force, interval, C_sb(middle.ravel()).reshape(*middle.shape, 3, 3), accel_bias).turned(theta)
-    up = force.mean(axis=1)
-    if np.any(np.linalg.norm(up, axis=1) < SAME_UP * np.mean(np.linalg.norm(force, axis=2))):
-        return NOT_TURNED
-    bench = TiltBench(force, interval, None, accel_bias)
-    found = bench.turned(theta)
-    if abs(found.alone) >= student_limit(limit("hint of a delay"), len(theta) - 1) * found.alone_sigma:
-        right = theta @ dcm_from_rotation_vector(-found.alone * found.axes[0]).T
-        if push_of_other_pieces(bench, theta, right) > limit("pushed in other pieces"):
-            return NOT_TURNED
-    return found
+    one = Tilt(*one_delay, scale, sigma_scale, turns, len(theta), *each, turn, pushed)
+    if C_sb is None:
+        return one
+    off_axes, sigma_axes = bench.turned(theta)
+    return replace(one, axes_turned=off_axes, axes_turned_sigma=sigma_axes, misaligned=misaligned)
 
 
 def least_scale(turned: Array) -> Array:
@@ -317,10 +274,10 @@ def whole_cells(record: ImuRecord) -> tuple[Array, float, Array]:
     return dtheta, interval, 0.5 * (time[:, 0] - record.interval + time[:, -1])
 
 
-def _cells(record: ImuRecord, most: float = MOST_TIME) -> tuple[Array, Array, float, Array] | None:
+def _cells(record: ImuRecord) -> tuple[Array, Array, float, Array] | None:
     """Turns (rad) and mean specific forces (m/s^2) of even cells of the record's middle, by pieces (P, L, 3), and their times."""
     middle = 0.5 * (record.time[0] + record.time[-1])
-    first, last = np.searchsorted(record.time, [middle - 0.5 * most, middle + 0.5 * most])
+    first, last = np.searchsorted(record.time, [middle - 0.5 * MOST_TIME, middle + 0.5 * MOST_TIME])
     rows = max(1, round(CELL / record.interval))
     interval = rows * record.interval
     length = round(PIECE / interval)

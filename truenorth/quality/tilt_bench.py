@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +18,6 @@ ROUNDS, LARGEST, STEP = 4, 0.1, 1e-3  # fits of turned axes; rad that one may ch
 MOST_OF_IT = 0.5  # of the squares of the turns about an axis, that an indexer makes
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
 EDGES = np.array([[25.0, -23.0, 13.0, -3.0], [3.0, 13.0, -5.0, 1.0]]) / 12.0
-
-
-class AxesTurned(NamedTuple):
-    """By which gyros' axes are turned against the accelerometers'."""
-
-    axes: Array  # (3, 3) unit vectors of the IMU: of one that stays the vertical and two level ones
-    angles: Array  # (3,) rad, about each
-    sigmas: Array  # (3,) rad
-    alone: float  # rad, about the first, where there is no turn about the others
-    alone_sigma: float  # rad
-    pieces: int  # from whose scatter the sigmas are
-
-
-NOT_TURNED = AxesTurned(AXES, np.zeros(3), np.full(3, math.inf), 0.0, math.inf, 2)
 
 
 class TiltBench:
@@ -102,14 +87,7 @@ class TiltBench:
         differentiated. On a rope of 15 m that of gyros of .05 deg/sqrt(h) made the arm too short, and scale factors 3 % wrong.
         """
         columns, C = self._columns(theta)
-        up = (C @ self.force[..., None])[..., 0]
-        rate = (C @ (theta / self.interval)[..., None])[..., 0]
-        rate -= rate.mean(axis=1, keepdims=True)
-        turns = C * theta[..., None, :]  # about each axis, in axes that do not turn
-        angle = np.cumsum(turns, axis=1) - 0.5 * turns
-        # Gyros that are late have not turned yet.
-        late = [self._averaged(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
-        scale = [self._averaged(np.cross(angle[..., i], up)).ravel() for i in range(3)]
+        late, scale = self._late_and_scaled(theta, C)
         biased = self.accel_bias * self._averaged(C).reshape(-1, 3)
         flat = self._averaged(columns).reshape(-1, 4)
         of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale], biased)
@@ -117,57 +95,39 @@ class TiltBench:
         off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
         return off, sigma
 
-    def turned(self, theta: Array) -> AxesTurned:
-        """Turn of the gyros' axes against the accelerometers'.
+    def turned(self, theta: Array) -> tuple[Array, Array]:
+        """(3,) turn of the gyros' axes against the accelerometers', rad, of an IMU that an indexer turns over; and one-sigmas.
 
-        Gyros that are turned by a small `a` see ``w + a x w``: of a base that sways gravity swings by the tilt's own amount times
-        the part of `a` about the vertical, across the way that the tilt makes it swing. Of turns about two level axes both show the
-        same part, and a wave pushes along the way of the tilt. A delay and scale factors are fitted along with it.
-
-        There the vertical alone is the sharper test. What it finds may be a part of a turn about a level axis, which the yaw of the
-        base and its arm show: all three together, the gyros put right and fitted again, have the size. Of an IMU that an indexer
-        turns over all three are sharp.
+        Gyros that are turned by a small `a` see ``w + a x w``: the force that they carry swings by ``a x f`` as the IMU turns. The
+        arm is fitted to the same rates, so the gyros are put right and fitted again, by what a little more of `a` changes in what
+        the arm leaves. A delay and scale factors are fitted along with it.
         """
-        axes, off, found, sigma = self._axes(), np.zeros(3), np.zeros(4), np.zeros(4)
-        alone = alone_sigma = math.nan
-        for again in range(ROUNDS):
-            right = theta @ dcm_from_rotation_vector(-off @ axes).T
+        off, sigma = np.zeros(3), np.full(3, math.inf)
+        for _ in range(ROUNDS):
+            right = theta @ dcm_from_rotation_vector(-off).T
             columns, C = self._columns(right)
             flat = self._averaged(columns).reshape(-1, 4)
-            arm = np.linalg.lstsq(flat[:, 1:], flat[:, 0], rcond=1e-9)[0]
-            left = np.append(1.0, -arm)  # the arm is fitted to the same rates
+            left = np.append(1.0, -np.linalg.lstsq(flat[:, 1:], flat[:, 0], rcond=1e-9)[0])
             more = [
-                [self._columns(right @ dcm_from_rotation_vector(h * axis).T)[0] for h in (STEP, -STEP)] for axis in axes
+                [self._columns(right @ dcm_from_rotation_vector(h * axis).T)[0] for h in (STEP, -STEP)] for axis in AXES
             ]
             turned = [self._averaged((plus - minus) @ left / (2.0 * STEP)).ravel() for plus, minus in more]
             biased = self.accel_bias * self._averaged(C).reshape(-1, 3)
-            known = self._late_and_scaled(right, C)
-            if again == 0:
-                first, spread = _by_pieces(len(theta), flat, [turned[0], *known], biased)
-                alone, alone_sigma = float(first[0]), float(spread[0])
-            found, sigma = _by_pieces(len(theta), flat, [*turned, *known], biased)
-            off = off + np.clip(found[:3], -LARGEST, LARGEST)
-        return AxesTurned(axes, off, sigma[:3], alone, alone_sigma, len(theta))
+            late, scale = self._late_and_scaled(right, C)
+            found, spread = _by_pieces(len(theta), flat, [*turned, late[0] + late[1] + late[2], *scale], biased)
+            off, sigma = off + np.clip(found[:3], -LARGEST, LARGEST), spread[:3]
+        return off, sigma
 
-    def _axes(self) -> Array:
-        """(3, 3) the vertical in an IMU that stays, and two level axes; the IMU's own where an indexer turns it."""
-        if self.C_sb is not None:
-            return AXES
-        up = self.force.mean(axis=(0, 1))
-        up /= np.linalg.norm(up)
-        one = np.cross(up, AXES[np.argmin(np.abs(up))])
-        one /= np.linalg.norm(one)
-        return np.stack([up, one, np.cross(up, one)])
-
-    def _late_and_scaled(self, theta: Array, C: Array) -> list[Array]:
-        """What gravity does where all gyros are late by a second, and where each turns too far by its all."""
+    def _late_and_scaled(self, theta: Array, C: Array) -> tuple[list[Array], list[Array]]:
+        """What gravity does where turns about each axis are late by a second, and where each gyro turns twice as far."""
         up = (C @ self.force[..., None])[..., 0]
         rate = (C @ (theta / self.interval)[..., None])[..., 0]
         rate -= rate.mean(axis=1, keepdims=True)
-        turns = C * theta[..., None, :]
+        turns = C * theta[..., None, :]  # about each axis, in axes that do not turn
         angle = np.cumsum(turns, axis=1) - 0.5 * turns
-        late = self._averaged(-np.cross(rate, up)).ravel()
-        return [late, *(self._averaged(np.cross(angle[..., i], up)).ravel() for i in range(3))]
+        # Gyros that are late have not turned yet.
+        late = [self._averaged(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
+        return late, [self._averaged(np.cross(angle[..., i], up)).ravel() for i in range(3)]
 
     def rate(self, theta: Array) -> float:
         """RMS of the rates, rad/s."""

@@ -233,12 +233,6 @@ LIMITS: dict[str, Limit] = {
         "of the squares",
         "that a delay explains, that may go with the tilt beyond it: of sound buoys, rafts and ships at the quay it is more",
     ),
-    "pushed in other pieces": Limit(
-        0.25,
-        "of the squares",
-        "that axes turned about the vertical explain, that a push beyond it may explain of a piece as the others show it: of 8 "
-        "turned triads .09 at most, of 9 moored ships that show a turn .45 and more",
-    ),
     "vibrates": Limit(
         2.0,
         "variance of the gyros' noise",

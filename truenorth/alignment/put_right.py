@@ -1,0 +1,71 @@
+"""A sensor of a swaying base put right, and its log aligned anew: is it that, or does the sea push in step with the tilt.
+
+Waves carry a ship to and fro while they roll her. To first order that is what many an error of a sensor makes of a base that sways:
+a force in step with the tilt. With the sensor put right the log is aligned anew, its motion fitted anew. Of a true error nothing
+goes with the tilt any more then: the motion that was left is the base's own, and the log is likelier by thousands. Of a push, which
+has its own phase, frequencies and directions, most is left. Asked is what any push in step would explain of the log that is put
+right, ``K = K0 + K1 jw + K2 (jw)^2`` along and across, as of :mod:`truenorth.quality.pushed`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias_step import SENSORS, seen_of
+from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.matched import innovations_of, whitened
+from truenorth.errors.staying import BA, BG
+from truenorth.filters.gains import through
+from truenorth.records import ImuRecord
+from truenorth.strapdown.increments import increments
+
+Array = NDArray[np.float64]
+
+FAST = 0.5  # rad of phase from row to row, at which an angle comes out 2 % too small
+
+
+def hardly_sampled(record: ImuRecord) -> bool:
+    """Whether the base turns to and fro so fast that from row to row the angle is not a sum of rates: it comes out too small."""
+    turned = increments(record)[0]
+    turned = turned - turned.mean(axis=0)
+    return bool(np.sum(np.diff(turned, axis=0) ** 2) > FAST**2 * np.sum(turned**2))
+
+
+def likelihood(fine: FineAlignment) -> float:
+    """Twice its logarithm."""
+    return 2.0 * float(fine.estimates.log_likelihood)
+
+
+def in_step(fine: FineAlignment) -> float:
+    """Squares of the white innovations that a push in step with the tilt explains, along each axis of the base and across."""
+    made, _, seen = through_filter(fine, seen_of(fine, _pushes(fine)))
+    Q = np.linalg.qr(made)[0]
+    return float(np.sum((Q.T @ seen) ** 2))
+
+
+def _pushes(fine: FineAlignment) -> Array:
+    """(K, 6, 18) forces in the IMU's axes that go with the tilt of two of its axes, its rate and its acceleration."""
+    log = fine.integrals
+    T = log.intervals[:, None]
+    C = fine.C_n0_i @ log.C_mean
+    up = C[:, 2]  # of n0, along the IMU's axes
+    one, other = np.argsort(np.abs(up.mean(axis=0)))[:2]  # those that are the most level
+    tilt = up[:, [one, other]] - up[:, [one, other]].mean(axis=0)
+    rate = np.gradient(tilt, axis=0) / T
+    acceleration = np.gradient(rate, axis=0) / T
+    along = C[:, :, one] * [1.0, 1.0, 0.0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    level = np.broadcast_to([0.0, 0.0, 1.0], along.shape)
+    ways = along, np.cross(level, along), level
+    forces = [moved[:, [j]] * way for moved in (tilt, rate, acceleration) for j in (0, 1) for way in ways]
+    errors = np.zeros((len(C), SENSORS.stop - SENSORS.start, len(forces)))
+    errors[:, BA.start - BG.start :] = np.swapaxes(C, 1, 2) @ np.stack(forces, axis=2)
+    return errors
+
+
+def through_filter(fine: FineAlignment, signatures: Array) -> tuple[Array, Array, Array]:
+    """White innovations (3 K, S) that signatures make, what they leave of the last state (n, S), and those of the log (3 K,)."""
+    seen = innovations_of(fine)
+    made, left = through(fine.gains, np.ascontiguousarray(signatures))
+    return whitened(seen.L, made).reshape(-1, made.shape[2]), left, seen.white[:, :, 0].ravel()
