@@ -61,3 +61,14 @@ def test_sound_sensors_have_none():
         ramp + 1e-3 * rng.standard_normal(ROWS),
     ):
         assert piled_up(values) is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_counts_that_were_added_up_and_taken_apart_miss_none(seed):
+    """Increments of an angle that is kept in counts: zero has one value, each other count many, which differ in their last digits."""
+    rng = np.random.default_rng(seed)
+    rate = 30.0 * np.sin(0.02 * np.arange(ROWS)) + 2.0 * rng.standard_normal(ROWS)
+    count = 4.848136811095e-7
+    angle = count * np.round(np.cumsum(rate))
+    dtheta = np.diff(angle, prepend=0.0)
+    assert piled_up(dtheta) is None

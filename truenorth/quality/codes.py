@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 LEAST = 30.0  # rows that the hole should have: none by chance in one of 10^13 of independent rows
 LEVELS = 10  # different values on either side, within the width of the hole: a hole of as many steps
+SPREAD = 6  # tenths of that width in which they lie: counts that were added up lie on few places, and differ in their last digits
 PART = 0.5  # of the rows that the hole should have, which must stand on the one value
 
 
@@ -50,7 +51,7 @@ def piled_up(values: Array) -> Pile | None:
         width = below + above
         first = int(np.searchsorted(levels, levels[k - 1] - width))
         last = int(np.searchsorted(levels, levels[k + 1] + width, side="right"))
-        if k - first < LEVELS or last - 1 - k < LEVELS:
+        if min(_places(levels[first:k], width), _places(levels[k + 1 : last], width)) < SPREAD:
             continue
         missing = float(min(before[k] - before[first], before[last] - before[k + 1]))
         if missing < LEAST or counts[k] < PART * missing:
@@ -58,6 +59,13 @@ def piled_up(values: Array) -> Pile | None:
         if found is None or width > found.below + found.above:
             found = Pile(float(levels[k]), below, above, int(counts[k]))
     return found
+
+
+def _places(levels: Array, width: float) -> int:
+    """Tenths of a width in which values lie; none of fewer than `LEVELS`."""
+    if len(levels) < LEVELS:
+        return 0
+    return len(np.unique(np.floor((levels - levels[0]) * LEVELS / width)))
 
 
 def codes_evidence(record: ImuRecord, lat: float | None = None) -> list[Evidence]:
