@@ -5,8 +5,10 @@ A folder of numbered parts, as a live run leaves its rows, is one table.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,27 +34,38 @@ def columns(path: Path, format: str) -> Columns:
     import pyarrow.feather as pf
     import pyarrow.parquet as pq
 
-    def table(names: Sequence[str] | None) -> pa.Table:
-        wanted = None if names is None else list(dict.fromkeys(names))
-        if path.is_dir():
-            parts = parts_of(path)[: 1 if wanted is None else None]
-            return pa.concat_tables([columns_of(part, wanted) for part in parts])
-        return columns_of(path, wanted)
-
-    def columns_of(path: Path, wanted: list[str] | None) -> pa.Table:
+    @contextmanager
+    def opened(path: Path) -> Iterator[Any]:
+        """A Parquet file; of a Feather file its columns."""
         try:
             if format == "feather":
-                return pf.read_table(path, columns=wanted)
-            with pq.ParquetFile(path) as file:
-                cells = 0 if wanted is None else file.metadata.num_rows * len(wanted)
-                if 8 * cells > LARGEST:  # equal values take next to nothing in the file
-                    raise DataError(
-                        f"{path.name}: holds more than {LARGEST >> 30} GiB; expected a log that fits into memory: cut it into parts"
-                    )
-                return file.schema_arrow.empty_table() if wanted is None else file.read(wanted, use_threads=False)
+                yield pf.read_table(path)
+            else:
+                with pq.ParquetFile(path) as file:
+                    yield file
         except (pa.ArrowException, OSError) as error:
             what = format.capitalize()
             raise DataError(f"{path.name}: the {what} file is damaged or cut short ({error}); write it anew") from None
+
+    def table(names: Sequence[str]) -> pa.Table:
+        wanted = list(dict.fromkeys(names))
+        if path.is_dir():
+            return pa.concat_tables([columns_of(part, wanted) for part in parts_of(path)])
+        return columns_of(path, wanted)
+
+    def columns_of(path: Path, wanted: list[str]) -> pa.Table:
+        with opened(path) as file:
+            if format == "feather":
+                return file.select(wanted)
+            if 8 * file.metadata.num_rows * len(wanted) > LARGEST:  # equal values take next to nothing in the file
+                raise DataError(
+                    f"{path.name}: holds more than {LARGEST >> 30} GiB; expected a log that fits into memory: cut it into parts"
+                )
+            return file.read(wanted, use_threads=False)
+
+    def names_of(path: Path) -> list[str]:
+        with opened(path) as file:  # no table without rows: to make one, pyarrow loads pandas
+            return list(file.column_names if format == "feather" else file.schema_arrow.names)
 
     def read(names: Sequence[str], gaps: bool = False) -> Array:
         found = table(names)
@@ -65,7 +78,9 @@ def columns(path: Path, format: str) -> Columns:
                 raise DataError(f"{path.name}: column {name} holds {kind}; expected {wanted}")
         return to_numpy([found.column(name).cast(pa.float64(), safe=False) for name in names])
 
-    return Columns(path, list(table(None).column_names), read, lambda name: table([name]).column(name))
+    return Columns(
+        path, names_of(parts_of(path)[0] if path.is_dir() else path), read, lambda name: table([name]).column(name)
+    )
 
 
 def parts_of(folder: Path) -> list[Path]:
