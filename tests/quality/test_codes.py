@@ -65,7 +65,7 @@ def test_sound_sensors_have_none():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_counts_that_were_added_up_and_taken_apart_miss_none(seed):
-    """Increments of an angle that is kept in counts: zero has one value, each other count many, which differ in their last digits."""
+    """Increments of an angle in counts: zero has one value, each other count many, which differ in their last digits."""
     rng = np.random.default_rng(seed)
     rate = 30.0 * np.sin(0.02 * np.arange(ROWS)) + 2.0 * rng.standard_normal(ROWS)
     count = 4.848136811095e-7

@@ -31,6 +31,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align, swinging, usual_sway
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
+from truenorth.alignment.turned_on_sway import turned_on_sway_evidence
 from truenorth.alignment.turning import infer_turning
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
 from truenorth.coarse import oba
@@ -173,9 +174,13 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
-    evidence = _of_encoder(record, encoder, axes, task, spec) + _of_filter(
-        answer, fine, spec, task, given=given is not None
-    )
+    evidence = _of_encoder(record, encoder, axes, task, spec)
+    evidence += _of_filter(answer, fine, spec, task, given=given is not None)
+    if isinstance(fine, SwayAlignment):
+        anew = usual_sway if fine.slow_arm is None else sway_align
+        about = start._replace(C_n0_i=fine.C_n0_i)
+        again = lambda log: anew(about._replace(record=log), mount, _turned(spec))  # noqa: E731
+        evidence += turned_on_sway_evidence(fine, record, spec, again)
     return judged(answer, evidence, heading_limit)
 
 

@@ -89,15 +89,12 @@ def _response(fine: SwayAlignment, prior: float) -> tuple[Array, Array, float]:
     `prior` is what is known of them, rad, one sigma: a turn of that size is none.
     """
     log, z = fine.about, fine.system.z
-    made = [
-        (
-            log.with_record(replace(log.record, gyro=log.record.gyro @ dcm_from_rotation_vector(STEP * axis).T))
-            .linearise()
-            .z
-            - z
-        )
-        for axis in np.eye(3)
-    ]
+    made = []
+    for i in range(3):
+        gyro, (j, k) = log.record.gyro.copy(), ((i + 1) % 3, (i + 2) % 3)
+        gyro[:, j] -= STEP * log.record.gyro[:, k]
+        gyro[:, k] += STEP * log.record.gyro[:, j]
+        made.append(log.with_record(replace(log.record, gyro=gyro)).linearise().z - z)
     white = innovations_of(fine, np.stack(made, axis=2) / STEP).white
     seen, response = white[..., 0].ravel(), white[..., 1:].reshape(-1, 3)
     N, b = response.T @ response, response.T @ seen

@@ -46,7 +46,7 @@ def record_evidence(
     sound : bool
         Whether clock, logging and range are known to be without fault, and the units and axes of the gyros.
     imu : ImuSpec, optional
-        Its accelerometers' biases pass for gravity that turns where the IMU does; its axes may be off by as much as it says.
+        Whose accelerometers' biases pass for gravity that turns where the IMU does.
     """
     found = [] if sound else sampling_evidence(record, turns=motion.overall not in QUIET)
     doubts = unit_findings(record, motion, gyros=not sound)
@@ -59,8 +59,7 @@ def record_evidence(
         return found
     found += vibration_evidence(record)
     accel_bias = 0.0 if imu is None else math.sqrt(float(imu.bias_variance[3:].max()))
-    misaligned = 0.0 if imu is None else math.hypot(imu.gyro_misalignment, imu.accel_misalignment)
-    tilt = check_tilt(record, C_sb, accel_bias, misaligned)
+    tilt = check_tilt(record, C_sb, accel_bias)
     return found if tilt is None else found + tilt.evidence()
 
 

@@ -331,11 +331,11 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             consecutive = bool(np.any(rows_at[SATURATED_RUN - 1 :] - rows_at[: 1 - SATURATED_RUN] == SATURATED_RUN - 1))
             # Noise of less than a quantum takes a row one further down; half a quantum is for rounding.
             lowest = second - (1.5 if noise <= top - second else 0.5) * (top - second)
-            consecutive = consecutive and not _crests(signed, rows_at, lowest, inside)
+            crests = _crests(signed, rows_at, lowest, inside)
             if noise <= top - second and inside > limit("piled") * max(int(counts[-4:-1].max(initial=0)), 2):
                 continue  # steady between two counts: what clips does not stand at the second as well
             often = count > limit("piled") * max(inside, 2)
-            piled = count > 2 * inside and (consecutive or often)
+            piled = count > 2 * inside and (consecutive or often) and not crests
             # Values that have many digits are never alike by chance, wherever the next ones stand.
             piled = piled and (
                 spread > 5.0 * (top - second) or (often and top - second > limit("piled") * _finest(levels))

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import permutations, product
 
 import numpy as np
@@ -37,7 +37,6 @@ Array = NDArray[np.float64]
 CELL = 0.1  # s, over which rates and forces are averaged
 PIECE = 20.0  # s, of a constant and a slope: biases and the earth turn gravity by less than a straight line
 MOST_TIME = 160.0  # s of a log that are looked at: its middle
-SURE_OF_AXES = 3.0  # sigmas of the specification's misalignment, which turned axes must exceed
 LEAST_TURN = math.radians(0.3)  # rad, RMS of the turns in a piece: below it nothing is said
 SHIFTS = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)  # s, by which gyros may be late, tried with the columns as given
 IDENTITY = "+x +y +z"
@@ -74,10 +73,6 @@ class Tilt:
         all along.
     pushed : Push
         Of a rough base: what goes with its tilt and is no delay.
-    axes_turned, axes_turned_sigma : (3,) arrays, rad
-        By which the gyros' axes are turned against the accelerometers' of an IMU that an indexer turns over, and its one-sigmas.
-    misaligned : float, rad
-        One sigma of the axes, by the specification; 0 where it says nothing.
     """
 
     given: float
@@ -95,9 +90,6 @@ class Tilt:
     by_axis_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     turn: float = 0.0
     pushed: Push = NO_PUSH
-    axes_turned: Array = field(default_factory=lambda: np.zeros(3))
-    axes_turned_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
-    misaligned: float = 0.0
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -132,17 +124,7 @@ class Tilt:
             size = float(off[i] * self.turned[i])
             figures = {"axis": "xyz"[i], "scale": float(self.scale[i]), "sigma": float(self.scale_sigma[i])}
             found.append(Evidence("tilt.scale", figures, "bounded", Effect(heading=size, level=size), ("units",)))
-        return found + self._turned_axes()
-
-    def _turned_axes(self) -> list[Evidence]:
-        """Gyros whose axes are turned find another north and another level by as much."""
-        least = SURE_OF_AXES * self.misaligned or limit("scale factor")
-        clear = student_limit(limit("clear delay"), self.pieces - 1)
-        if not np.any(np.abs(self.axes_turned) >= np.maximum(least, clear * self.axes_turned_sigma)):
-            return []
-        size = float(np.linalg.norm(self.axes_turned))
-        figures: dict[str, Figure] = {"turn": size, "sigma": float(np.max(self.axes_turned_sigma))}
-        return [Evidence("tilt.turned", figures, "bounded", Effect(heading=size, level=size), ("imu_axes",))]
+        return found
 
     @property
     def rough(self) -> bool:
@@ -161,9 +143,7 @@ class Tilt:
         return bool(np.count_nonzero(shown) > 1)
 
 
-def check_tilt(
-    record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, accel_bias: float = 0.0, misaligned: float = 0.0
-) -> Tilt | None:
+def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, accel_bias: float = 0.0) -> Tilt | None:
     """Try all readings of the gyros on the middle of a record.
 
     Parameters
@@ -172,8 +152,6 @@ def check_tilt(
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
     accel_bias : float, m/s^2
         One sigma.
-    misaligned : float, rad
-        One sigma of the axes of one sensor against the other's; 0 where nothing is said.
 
     Returns
     -------
@@ -235,11 +213,7 @@ def check_tilt(
     turn = abs(late) * bench.rate_up(theta)
     pushed = push_in_step(bench, theta, shifted(theta, late / interval)) if may_be_pushed else NO_PUSH
     one_delay = given, unturned, best, axes, late, float(sigma[0]), tilt
-    one = Tilt(*one_delay, scale, sigma_scale, turns, len(theta), *each, turn, pushed)
-    if C_sb is None:
-        return one
-    off_axes, sigma_axes = bench.turned(theta)
-    return replace(one, axes_turned=off_axes, axes_turned_sigma=sigma_axes, misaligned=misaligned)
+    return Tilt(*one_delay, scale, sigma_scale, turns, len(theta), *each, turn, pushed)
 
 
 def least_scale(turned: Array) -> Array:

@@ -7,14 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import dcm_from_quaternion, dcm_from_rotation_vector, skew
+from truenorth.core.attitude import dcm_from_quaternion, skew
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
 
 AXES = np.eye(3)
 AVERAGED = 5  # cells of a tenth of a second: gyros differentiated over as many have a 25th of the noise power
-ROUNDS, LARGEST, STEP = 4, 0.1, 1e-3  # fits of turned axes; rad that one may change them by, and of a difference
 MOST_OF_IT = 0.5  # of the squares of the turns about an axis, that an indexer makes
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
 EDGES = np.array([[25.0, -23.0, 13.0, -3.0], [3.0, 13.0, -5.0, 1.0]]) / 12.0
@@ -87,39 +86,6 @@ class TiltBench:
         differentiated. On a rope of 15 m that of gyros of .05 deg/sqrt(h) made the arm too short, and scale factors 3 % wrong.
         """
         columns, C = self._columns(theta)
-        late, scale = self._late_and_scaled(theta, C)
-        biased = self.accel_bias * self._averaged(C).reshape(-1, 3)
-        flat = self._averaged(columns).reshape(-1, 4)
-        of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale], biased)
-        of_each = _by_pieces(len(theta), flat, [*late, *scale], biased)
-        off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
-        return off, sigma
-
-    def turned(self, theta: Array) -> tuple[Array, Array]:
-        """(3,) turn of the gyros' axes against the accelerometers', rad, of an IMU that an indexer turns over; and one-sigmas.
-
-        Gyros that are turned by a small `a` see ``w + a x w``: the force that they carry swings by ``a x f`` as the IMU turns. The
-        arm is fitted to the same rates, so the gyros are put right and fitted again, by what a little more of `a` changes in what
-        the arm leaves. A delay and scale factors are fitted along with it.
-        """
-        off, sigma = np.zeros(3), np.full(3, math.inf)
-        for _ in range(ROUNDS):
-            right = theta @ dcm_from_rotation_vector(-off).T
-            columns, C = self._columns(right)
-            flat = self._averaged(columns).reshape(-1, 4)
-            left = np.append(1.0, -np.linalg.lstsq(flat[:, 1:], flat[:, 0], rcond=1e-9)[0])
-            more = [
-                [self._columns(right @ dcm_from_rotation_vector(h * axis).T)[0] for h in (STEP, -STEP)] for axis in AXES
-            ]
-            turned = [self._averaged((plus - minus) @ left / (2.0 * STEP)).ravel() for plus, minus in more]
-            biased = self.accel_bias * self._averaged(C).reshape(-1, 3)
-            late, scale = self._late_and_scaled(right, C)
-            found, spread = _by_pieces(len(theta), flat, [*turned, late[0] + late[1] + late[2], *scale], biased)
-            off, sigma = off + np.clip(found[:3], -LARGEST, LARGEST), spread[:3]
-        return off, sigma
-
-    def _late_and_scaled(self, theta: Array, C: Array) -> tuple[list[Array], list[Array]]:
-        """What gravity does where turns about each axis are late by a second, and where each gyro turns twice as far."""
         up = (C @ self.force[..., None])[..., 0]
         rate = (C @ (theta / self.interval)[..., None])[..., 0]
         rate -= rate.mean(axis=1, keepdims=True)
@@ -127,7 +93,13 @@ class TiltBench:
         angle = np.cumsum(turns, axis=1) - 0.5 * turns
         # Gyros that are late have not turned yet.
         late = [self._averaged(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
-        return late, [self._averaged(np.cross(angle[..., i], up)).ravel() for i in range(3)]
+        scale = [self._averaged(np.cross(angle[..., i], up)).ravel() for i in range(3)]
+        biased = self.accel_bias * self._averaged(C).reshape(-1, 3)
+        flat = self._averaged(columns).reshape(-1, 4)
+        of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale], biased)
+        of_each = _by_pieces(len(theta), flat, [*late, *scale], biased)
+        off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
+        return off, sigma
 
     def rate(self, theta: Array) -> float:
         """RMS of the rates, rad/s."""
