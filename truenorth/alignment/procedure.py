@@ -24,6 +24,7 @@ from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import BEND, CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.from_means import SHORTEST_FILTER, from_means, level_from_means, turned_by
+from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
@@ -37,7 +38,6 @@ from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align, usual_sway
 from truenorth.alignment.swung_bias import swung_biases
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
-from truenorth.alignment.turned_on_sway import turned_on_sway_evidence
 from truenorth.alignment.turning import (
     infer_turning,
     rocks_all_along,
@@ -336,9 +336,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
         about, anew = start._replace(C_n0_i=fine.C_n0_i), usual_sway if fine.slow_arm is None else sway_align
-        again = lambda record: anew(about._replace(record=record), turned=turned, axes=spec)  # noqa: E731
+        again = lambda log, wide=None: anew(about._replace(record=log), turned=wide or turned, axes=spec)  # noqa: E731
         steps += scale_on_sway_evidence(fine, task.record, again)
-        steps += turned_on_sway_evidence(fine, task.record, used, again)
+        steps += gyro_matrix_evidence(fine, task.record, used, again)
     way = farthest(fine, task.position) if swung else math.inf
     left = _moves_on(task, fine) if swung else None
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, left)

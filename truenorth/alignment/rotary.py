@@ -24,6 +24,7 @@ from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.encoder_angles import angles_at, carried_angles
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
+from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
@@ -31,7 +32,6 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align, swinging, usual_sway
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
-from truenorth.alignment.turned_on_sway import turned_on_sway_evidence
 from truenorth.alignment.turning import infer_turning
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
 from truenorth.coarse import oba
@@ -179,8 +179,8 @@ def align_rotary(
     if isinstance(fine, SwayAlignment):
         anew = usual_sway if fine.slow_arm is None else sway_align
         about = start._replace(C_n0_i=fine.C_n0_i)
-        again = lambda log: anew(about._replace(record=log), mount, _turned(spec))  # noqa: E731
-        evidence += turned_on_sway_evidence(fine, record, spec, again)
+        again = lambda log, wide=None: anew(about._replace(record=log), mount, wide or _turned(spec))  # noqa: E731
+        evidence += gyro_matrix_evidence(fine, record, spec, again)
     return judged(answer, evidence, heading_limit)
 
 

@@ -67,6 +67,14 @@ def _half_turned(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     return replace(record, gyro=record.gyro * turn), "gyro x and y"
 
 
+def _askew(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
+    """One gyro that sits askew by .3 to 3 deg: it sees a part of the turns about another axis."""
+    (axis, other), angle = rng.permutation(3)[:2].tolist(), either(rng, 0.3, 3.0)
+    gyro = record.gyro.copy()
+    gyro[:, axis] += math.radians(angle) * record.gyro[:, other]
+    return replace(record, gyro=gyro), f"{'xyz'[axis]} by {angle:+.2f} deg towards {'xyz'[other]}"
+
+
 def _turned_axes(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     """Gyros whose block is turned against the accelerometers' by .3 to 3 deg about any axis."""
     angle, way = over_decades(rng, 0.3, 3.0), rng.standard_normal(3)
@@ -283,6 +291,7 @@ IMU_FAULTS: tuple[Fault, ...] = (
     _scaled("accel sign", "accel", lambda rng: -1.0),
     of_imu("half a turn", _half_turned),
     of_imu("gyro axes turned", _turned_axes),
+    of_imu("gyro askew", _askew),
     _scaled("gyro scale", "gyro", lambda rng: 1.0 + either(rng, 0.02, 0.3)),
     _scaled("accel scale", "accel", lambda rng: 1.0 + either(rng, 0.02, 0.3)),
     _unit("gyro", {"deg/s": math.degrees(1.0), "deg/h": math.degrees(3600.0), "mrad/s": 1e3, "rad a row": 0.02}),

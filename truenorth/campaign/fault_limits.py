@@ -31,12 +31,6 @@ ON_A_SIDE = (
     "rate contradicts, and heading is refused"
 )
 
-IN_THE_ARM = (
-    "a scale error k of a gyro makes the tilt swing by k times the sway, and gravity with it: to first order the swing of an arm "
-    "k g / w^2, which is not known (.02 to .3 are .1 to 7 m at periods of 5 to 10 s); products of sways, a tenth of it, tell the "
-    "two apart no better than .03 to .3 of the scale (one sigma, the fit of `quality/tilt.py` in 160 s)"
-)
-
 BY_LIKELIHOOD = (
     "measured, trial by trial: the aiding measurements prefer the true sensors over those that the procedure assumes by less "
     "than 25 (twice the logarithm of the likelihood ratio, the fault known exactly). By Neyman and Pearson no test does better, "
@@ -77,7 +71,11 @@ LIKE_MOTION = (
 # A turn that lags is another heading while it lasts; straight and level flight shows a master by velocity no heading.
 LATE = ("late gyros", "gyros late by a filter")
 SIGNS = ("gyro sign",)
-LIKE_HEADING = ("gyro scale", "gyro axes turned")  # that act on a base at rest as another heading does, to first order
+LIKE_HEADING = (
+    "gyro scale",
+    "gyro axes turned",
+    "gyro askew",
+)  # that act on a base at rest as another heading does, to first order
 
 
 class Unseen(NamedTuple):
@@ -96,7 +94,6 @@ UNSEEN: tuple[Unseen, ...] = (
     Unseen(REST, "half a turn", "", LEVEL),
     Unseen(("unspecified",), "accel axes exchanged", "(?!yxz)", ON_A_SIDE),
     Unseen(("unspecified",), "accel sign", "z ", ON_A_SIDE),
-    Unseen(("swaying",), "gyro scale", "", IN_THE_ARM),
     Unseen(("rotary",), "zero of the outer angle", "", "it defines the body's axes: heading is as far off as the zero"),
 )
 

@@ -160,7 +160,7 @@ SENTENCES = {
     "tilt.gyros_late": "the gyros are {delay:.3f} s late against the accelerometers, by how gravity turns in these",
     "tilt.gyros_early": "the gyros are {delay:.3f} s early against the accelerometers, by how gravity turns in these",
     "tilt.scale": "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers",
-    "tilt.turned": "the gyros are turned against the accelerometers by {turn:angle} ± {sigma:angle}, by how gravity swings",
+    "tilt.turned": "axes of the gyros are off by {turn:angle} ± {sigma:angle} against the accelerometers, by how gravity swings",
     "bias.gyro": (
         "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu:imu}) allows {allowed:deg/h|} deg/h"
     ),

@@ -1,4 +1,4 @@
-"""Gyros that are turned against their accelerometers, on a base that sways and on an indexer; and a sea that pushes in step."""
+"""Gyros that are scaled, askew or turned against accelerometers, on a base that sways and on an indexer; and a push in step."""
 
 from dataclasses import replace
 
@@ -34,7 +34,24 @@ def turn_found(answer):
 def test_a_turn_on_a_sway_is_found_and_refused(run, degrees):
     inputs, _ = BENCHES["swaying"].draw(SEED, run)
     answer = BENCHES["swaying"].align(inputs | {"record": turned(inputs["record"], degrees)})
-    assert np.degrees(turn_found(answer)["turn"]) == pytest.approx(np.linalg.norm(degrees), abs=0.06)
+    found = turn_found(answer)
+    assert abs(found["turn"] - np.radians(np.linalg.norm(degrees))) < 4.0 * found["sigma"] < np.radians(0.7)
+    assert answer.status == "inconsistent"
+
+
+@pytest.mark.parametrize(
+    ("run", "row", "column", "size"),
+    some([(4, 0, 1, -0.0078)], [(1, 0, 0, -0.015), (6, 1, 1, -0.0071), (7, 0, 0, 0.0273)]),
+)
+def test_one_gyro_that_is_askew_or_scaled_is_found_and_refused(run, row, column, size):
+    """Behind an arm of metres, which swings as a scale factor does; up to 28 sigmas of heading, `aligned`."""
+    inputs, _ = BENCHES["swaying"].draw(60, run)
+    gyro = inputs["record"].gyro.copy()
+    gyro[:, row] += size * inputs["record"].gyro[:, column]
+    answer = BENCHES["swaying"].align(inputs | {"record": replace(inputs["record"], gyro=gyro)})
+    key = "tilt.scale" if row == column else "tilt.turned"
+    figures = next(item.figures for item in answer.evidence if item.key == key)
+    assert figures.get("scale", figures.get("turn")) == pytest.approx(size if row == column else abs(size), abs=4e-4)
     assert answer.status == "inconsistent"
 
 
