@@ -4,7 +4,8 @@ All rows take half an hour; ``ROWS`` are numbers of some of them, such as ``1,2,
 the library that both have (:mod:`benchmarks.parts`), each checkout in a process of its own, in turn.
 
 Processor time of whole processes, children included, the least of the repetitions: what else the machine does counts
-little. Each checkout runs with the interpreter of its own ``.venv`` (``make .venv/.ready`` there).
+little. With it stand the medians, and the median of the ratios of the pairs. Each checkout runs with the interpreter of its own
+``.venv`` (``make .venv/.ready`` there), or with this one where it has none.
 """
 
 from __future__ import annotations
@@ -58,6 +59,12 @@ print(json.dumps((time.process_time() - begun) / 20 * 1000))
 """
 
 
+def interpreter(checkout: Path) -> str:
+    """That of a checkout's own environment, or this one."""
+    own = checkout / ".venv/bin/python"
+    return str(own) if own.exists() else sys.executable
+
+
 def spent(
     checkout: Path, command: list[str], folder: Path, cache: Path | None = None, package: Path | None = None
 ) -> float:
@@ -65,16 +72,14 @@ def spent(
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     environment |= {"PYTHONPATH": str(package or checkout)} | ({} if cache is None else {"NUMBA_CACHE_DIR": str(cache)})
     before = os.times()
-    subprocess.run(
-        [str(checkout / ".venv/bin/python"), *command], env=environment, cwd=folder, check=True, capture_output=True
-    )
+    subprocess.run([interpreter(checkout), *command], env=environment, cwd=folder, check=True, capture_output=True)
     after = os.times()
     return after.children_user + after.children_system - before.children_user - before.children_system
 
 
 def said(checkout: Path, program: str) -> Any:
     """What a program prints, as JSON; it imports what stands in the checkout."""
-    python, environment = str(checkout / ".venv/bin/python"), {**os.environ, "PYTHONPATH": str(checkout)}
+    python, environment = interpreter(checkout), {**os.environ, "PYTHONPATH": str(checkout)}
     done = subprocess.run(
         [python, "-c", program], cwd=checkout, check=True, capture_output=True, text=True, env=environment
     )
@@ -107,7 +112,9 @@ def main() -> None:
 
         def both(measure: Callable[[Path], float], times: int) -> list[float]:
             rounds = [[measure(checkout) for checkout in (old, NEW)] for _ in range(times)]
-            return list(np.min(rounds, axis=0))
+            before, now = np.transpose(rounds)
+            least, middle = np.min(rounds, axis=0), np.median(rounds, axis=0)
+            return [*least, *middle, float(np.median(now / before))]
 
         command = ["-c", PROGRAM, "align", str(log), *WHERE]
 
@@ -161,10 +168,14 @@ def main() -> None:
         for number, once in ((1, align), (2, with_report), (3, with_report), (6, demo)):
             if number in asked:
                 both(once, 1)  # what is not compiled yet
-        print(head, flush=True)
+        print(
+            "| what | before | now | medians | median of now / before |\n| --- | ---: | ---: | ---: | ---: |",
+            flush=True,
+        )
         for what, measured in (rows[number - 1] for number in asked):
-            before, now = measured()
-            print(f"| {what} | {before:.2f} | {now:.2f} | {before / now:.1f} |", flush=True)
+            before, now, *others = measured()
+            medians, ratio = (f"{others[0]:.2f}, {others[1]:.2f}", others[2]) if others else ("", now / before)
+            print(f"| {what} | {before:.2f} | {now:.2f} | {medians} | {ratio:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

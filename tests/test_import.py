@@ -121,3 +121,26 @@ def test_a_table_is_read_without_pandas(tmp_path):
     read = f"import sys; from truenorth.formats import read_imu; read_imu({str(tmp_path / 'log.parquet')!r})"
     run(code)
     assert run(f"{read}\nprint('pandas' in sys.modules)").strip() == "False"
+
+
+def test_a_module_does_not_hide_the_function_of_its_name():
+    """Whatever was loaded first: a package of lazy names has functions whose modules have the same name."""
+    code = "\n".join(
+        [
+            "import truenorth.filters.kalman, truenorth.filters.fading, truenorth.analysis.cramer_rao",
+            "import truenorth.filters, truenorth.analysis",
+            "from truenorth.filters import kalman, recursion",
+            "for package in (truenorth.filters, truenorth.analysis):",
+            "    for name in package.__all__:",
+            "        assert type(getattr(package, name)) is not type(recursion), name",
+            "print(type(kalman).__name__, type(recursion).__name__, dir(truenorth.filters) == sorted(truenorth.filters.__all__))",
+        ]
+    )
+    assert run(code).split() == ["function", "module", "True"]
+
+
+def test_an_alignment_loads_no_filter_of_nonlinear_systems():
+    code = "import truenorth.alignment.procedure, sys; print(*[m for m in sys.modules if m.startswith('truenorth.')])"
+    loaded = set(run(code).split())
+    assert "truenorth.filters.system" in loaded
+    assert not loaded & {"truenorth.filters.particle", "truenorth.filters.extended", "truenorth.analysis.cramer_rao"}

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.runs import some
-from truenorth.alignment import align
+from truenorth.alignment import align, slow_sway, swaying
+from truenorth.alignment.matched import whitened
 from truenorth.alignment.slow_sway import is_slow
 from truenorth.campaign.fault import Inputs
 from truenorth.campaign.fault_benches import BENCHES, Truth, misses
@@ -91,3 +92,62 @@ def test_slow_is_few_periods_or_none_at_all() -> None:
     assert not is_slow(swell, 240.0)
     assert is_slow(swell, 40.0)
     assert is_slow(Oscillator(2, 0.1, 2.0 * math.pi / 8.0, 0.7), 240.0)
+
+
+def _asked(monkeypatch: pytest.MonkeyPatch, inputs: Inputs) -> list:
+    """What the question of an alignment of a log is asked with, of the usual motion."""
+    asked = []
+    answers = swaying.slow_sway_evidence
+
+    def remember(*given):
+        asked.append(given)
+        return answers(*given)
+
+    monkeypatch.setattr(swaying, "slow_sway_evidence", remember)
+    align(inputs["record"], inputs["place"], inputs["imu"])
+    return asked[0]
+
+
+def _left_by_a_bias() -> Inputs:
+    inputs, _ = BENCHES["swaying"].draw(12, 6)
+    spoil = next(item.apply for item in FAULTS if item.name == "accel bias step")
+    spoilt, _ = spoil(inputs, np.random.default_rng([12, 6, crc32(b"swaying accel bias step")]))
+    return spoilt | {"place": inputs["place"]}
+
+
+@pytest.mark.parametrize("sound", [True, False])
+def test_what_is_left_out_changes_no_evidence(sound: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """States that nothing moves, to the same bits; a motion fitted anew to the log as it is, where nothing can come of it."""
+    inputs = _moored(1, period=150.0, amplitude=0.2, duration=300.0)[0] if sound else _left_by_a_bias()
+    fine, full, motion, without = _asked(monkeypatch, inputs)
+    moved = slow_sway._with(fine, full(), True)
+    assert moved.system.states < fine.system.states
+    for cause, other in zip(slow_sway.causes(fine), slow_sway.causes(moved), strict=True):
+        assert cause[:5] == other[:5]
+        assert np.array_equal(cause.phi, other.phi)
+        assert np.array_equal(cause.seen, other.seen)
+    as_it_is = []
+
+    def counted(seen):
+        as_it_is.append(not seen.any())
+        return without(seen)
+
+    found = slow_sway.slow_sway_evidence(fine, full, motion, counted)
+    assert as_it_is
+    assert any(as_it_is) is not sound
+    monkeypatch.setattr(slow_sway, "_is_nothing", lambda *_: False)
+    assert slow_sway.slow_sway_evidence(fine, full, motion, counted) == found
+    assert any(as_it_is)
+    assert bool(found) is not sound
+
+
+def test_departures_are_matched_two_by_two() -> None:
+    rng = np.random.default_rng(1)
+    K, W = 50, 3
+    y, white = rng.standard_normal((K, 3, 2 * W)), rng.standard_normal((K, 3, 1))
+    L = np.tril(rng.standard_normal((K, 3, 3))) + 3.0 * np.eye(3)
+    energy, match = np.zeros((W, 2, 2)), np.zeros((W, 2))
+    slow_sway._match_pairs(L, white, y, energy, match)
+    pairs = whitened(L, y).reshape(-1, W, 2)
+    assert np.allclose(energy, np.einsum("kwi,kwj->wij", pairs, pairs), rtol=1e-13)
+    assert np.allclose(match, np.einsum("kwi,k->wi", pairs, white.ravel()), rtol=1e-13, atol=1e-13)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, runtime_checkable
 
 from numpy.typing import ArrayLike
 
@@ -16,11 +16,13 @@ from truenorth.aiding.matching import What
 from truenorth.aiding.sensors import from_gnss, from_height, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.errors.log import LogErrors, log_errors
-from truenorth.errors.master import MasterErrors
 from truenorth.records import EncoderRecord, GnssRecord, HeightRecord, MasterRecord, OdometerRecord, VelocityRecord
 from truenorth.records.flexure import FlexureSpec
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.mounting import Mounting
+
+if TYPE_CHECKING:
+    from truenorth.errors.master import MasterErrors
 
 ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
 BASELINE = math.radians(1.0)  # of a second antenna said to be ahead of the first

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,10 @@ from truenorth.alignment.drift import AXES, ONSETS, drift_signatures
 from truenorth.alignment.drift import KINDS as COURSES
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import Innovations, innovations_of, matched, whitened
+from truenorth.core.compiled import compiled
 from truenorth.errors.staying import PHI
 from truenorth.errors.sway import AxisMotion, Oscillator, motion_first
-from truenorth.filters import LinearSystem, kalman
+from truenorth.filters import Estimates, LinearSystem, kalman
 from truenorth.filters.gains import filter_gains, through
 from truenorth.quality.colour import colour_of
 from truenorth.state.evidence import Effect, Evidence, Figure
@@ -85,16 +86,21 @@ def slow_sway_evidence(
     lowest = -2.0 * float(as_fitted.log_likelihood)
     found = []
     for share in SMALLER:
-        other = fine if share == 1.0 else _with_less(fine, _smaller(system, motion, duration, share))
+        other = _with(fine, system if share == 1.0 else _smaller(system, motion, duration, share), share == 1.0)
         lowest = min(lowest, -2.0 * float(other.estimates.log_likelihood))
         # With the motion as fitted chance finds something in every log: there the usual limit decides.
         found += [(limit("drift") if share == 1.0 else -limit("ruled out"), cause) for cause in causes(other)]
-    # Oscillators that were fitted along with what began are not what is left without it. With nothing off they may fit better, too.
-    lowest = min(lowest, without(np.zeros_like(system.z))[0])
+    # Oscillators that were fitted along with what began are not what is left without it.
     for kind in {_kind(cause) for _, cause in found}:
         likeliest = min((cause for _, cause in found if _kind(cause) == kind), key=lambda cause: cause.cost)
         cost, phi = without(likeliest.seen)
         found.append((limit("drift"), likeliest._replace(cost=cost, phi=phi)))
+    end, sigma = as_fitted.x[-1][PHI], np.sqrt(np.diag(as_fitted.P[-1])[PHI])
+    likely = [cause for least, cause in found if lowest - cause.cost > least]
+    # With nothing off they may fit better, too. That lowers all ratios: what is nothing with higher ones is nothing.
+    if _is_nothing(likely, lowest, end, sigma):
+        return []
+    lowest = min(lowest, without(np.zeros_like(system.z))[0])
     likely = [cause for least, cause in found if lowest - cause.cost > least]
     if not likely:
         return []
@@ -102,7 +108,6 @@ def slow_sway_evidence(
     ratio, best = max(
         ((_weighed(fine, seen, cause, lowest - cause.cost), cause) for cause in likely), key=lambda pair: pair[0]
     )
-    end = as_fitted.x[-1][PHI]
     moved = np.array([cause.phi for cause in likely]) - end
     heading, level = float(np.abs(moved[:, 2]).max()), float(np.hypot(moved[:, 0], moved[:, 1]).max())
     figures: dict[str, Figure] = {
@@ -116,10 +121,19 @@ def slow_sway_evidence(
     }
     effect = Effect(heading, level)
     if may_be_chance(ratio):
-        if np.all(np.abs(moved) < limit("negligible") * np.sqrt(np.diag(as_fitted.P[-1])[PHI])):
+        if _negligible(moved, sigma):
             return []  # what nobody can rule out, and changes nothing
         return [Evidence("sway.slow", figures, "hint", effect, ("record_longer",))]
     return [Evidence(best.key, figures, "bounded", effect, ("still_part",))]
+
+
+def _is_nothing(likely: Sequence[Cause], lowest: float, end: Array, sigma: Array) -> bool:
+    """Whether chance gives all that is likely, and none of it moves the answer (3,) at the end."""
+    return all(may_be_chance(lowest - cause.cost) and _negligible(cause.phi - end, sigma) for cause in likely)
+
+
+def _negligible(moved: Array, sigma: Array) -> bool:
+    return bool(np.all(np.abs(moved) < limit("negligible") * sigma))
 
 
 def _weighed(fine: FineAlignment, seen: Innovations, cause: Cause, ratio: float) -> float:
@@ -131,10 +145,29 @@ def _weighed(fine: FineAlignment, seen: Innovations, cause: Cause, ratio: float)
     return colour_of(nu - size * signature, signature).ratio(ratio)
 
 
-def _with_less(fine: FineAlignment, less: LinearSystem) -> FineAlignment:
-    """The log filtered with less of a motion."""
-    estimates = kalman(less, history="full")
-    return replace(fine, system=less, estimates=estimates, gains=filter_gains(less, estimates))
+def _with(fine: FineAlignment, system: LinearSystem, filtered: bool) -> FineAlignment:
+    """The log by a system with less of a motion, or as it was filtered; without states that nothing moves."""
+    system, estimates = _of_moved_states(system, fine.estimates if filtered else kalman(system, history="full"))
+    return replace(fine, system=system, estimates=estimates, gains=filter_gains(system, estimates))
+
+
+def _of_moved_states(system: LinearSystem, estimates: Estimates) -> tuple[LinearSystem, Estimates]:
+    """Without states of the base's motion that are zero throughout: what follows takes a part of the time, to the same bits."""
+    first = motion_first(system.states, 0)
+    variances = np.diagonal(estimates.P, axis1=1, axis2=2)[:, first:]
+    at = np.concatenate([np.arange(first), first + np.flatnonzero(variances.any(axis=0))])
+
+    def of(a: Array) -> Array:
+        return np.ascontiguousarray(a[..., at])
+
+    def block(a: Array) -> Array:
+        return np.ascontiguousarray(a[..., at[:, None], at])
+
+    arrays = {name: block(getattr(system, name)) for name in ("Phi", "Q", "P0")}
+    arrays |= {name: of(getattr(system, name)) for name in ("H", "x0")}
+    S = None if system.S is None else np.ascontiguousarray(system.S[..., at, :])
+    kept = replace(estimates, x=of(estimates.x), sigma=of(estimates.sigma), P=block(estimates.P))
+    return system.with_made(**arrays, S=S), kept
 
 
 def _kind(cause: Cause) -> str:
@@ -191,29 +224,55 @@ def causes(fine: FineAlignment) -> Iterator[Cause]:
 
 def _departure(fine: FineAlignment, seen: Innovations, onsets: Sequence[float]) -> Cause:
     """The best of departures that begin then: a level velocity is taken up smoothly, and stays."""
-    t, duration = fine.integrals.time, float(fine.integrals.time[-1])
-    middle = 0.5 * (t[1:] + t[:-1])
-    when = [(onset, take * duration / PARTS) for onset in onsets for take in TAKES]
-    signature = np.zeros((len(middle), 3, 2 * len(when)))
-    for k, (onset, take) in enumerate(when):
-        s = np.clip((middle - onset) / take, 0.0, 1.0)
-        v = s**2 * (3.0 - 2.0 * s)
-        for axis in (0, 1):
-            signature[:, axis, 2 * k + axis] = v if fine.form == "velocity" else np.diff(v, prepend=0.0)
-    through_filter, left = through(fine.gains, signature)
-    white = whitened(seen.L, through_filter).reshape(-1, len(when), 2)
-    nu = seen.white[:, :, 0].ravel()
-    east, north = white[..., 0], white[..., 1]
-    both = np.sum(east * north, axis=0)
-    energy = np.array([[np.sum(east**2, axis=0), both], [both, np.sum(north**2, axis=0)]]).transpose(2, 0, 1)
-    energy = energy + 1e-300 * np.eye(2)
-    match = np.sum(white * nu[:, None, None], axis=0)
-    size = np.linalg.solve(energy, match[..., None])[..., 0]
+    made, when = _taken_up(fine, onsets)
+    through_filter, left = through(fine.gains, made)
+    energy, match = np.zeros((len(when), 2, 2)), np.zeros((len(when), 2))
+    _match_pairs(seen.L, seen.white, through_filter, energy, match)
+    size = np.linalg.solve(energy + 1e-300 * np.eye(2), match[..., None])[..., 0]
     ratio = np.sum(size * match, axis=1)
     best = int(np.argmax(ratio))
     v = size[best]
     phi = fine.estimates.x[-1][PHI] - left[PHI].reshape(3, len(when), 2)[:, best] @ v
     cost = -2.0 * float(fine.estimates.log_likelihood) - float(ratio[best])
     axis_name = AXES[int(np.argmax(np.abs(v)))]
-    made = signature[:, :, 2 * best : 2 * best + 2] @ v
-    return Cause(cost, "drift.step", axis_name, when[best][0], float(np.hypot(*v)), phi, made)
+    seen_of_it = made[:, :, 2 * best : 2 * best + 2] @ v
+    return Cause(cost, "drift.step", axis_name, when[best][0], float(np.hypot(*v)), phi, seen_of_it)
+
+
+def _taken_up(fine: FineAlignment, onsets: Sequence[float]) -> tuple[Array, list[tuple[float, float]]]:
+    """Signatures (K, 3, 2 W) of departures, east and north in turn, and onset and length of each, s."""
+    t, duration = fine.integrals.time, float(fine.integrals.time[-1])
+    middle = 0.5 * (t[1:] + t[:-1])
+    when = [(onset, take * duration / PARTS) for onset in onsets for take in TAKES]
+    onset, take = np.array(when).T
+    s = np.minimum(np.maximum((middle[:, None] - onset) / take, 0.0), 1.0)
+    v = s**2 * (3.0 - 2.0 * s)
+    made = np.zeros((len(middle), 3, 2 * len(when)))
+    for axis in (0, 1):
+        made[:, axis, axis::2] = v if fine.form == "velocity" else np.diff(v, axis=0, prepend=0.0)
+    return made, when
+
+
+@compiled
+def _match_pairs(L: Any, white: Any, y: Any, energy: Any, match: Any) -> None:
+    """Energies (W, 2, 2) of W pairs in y (K, m, 2 W), made white, and their matches (W, 2) with the innovations."""
+    m, count = y.shape[1], len(energy)
+    row, known = np.empty((m, y.shape[2])), np.empty(y.shape[2])
+    for k in range(len(y)):
+        for i in range(m):
+            for j in range(y.shape[2]):
+                known[j] = 0.0
+            for r in range(i):
+                for j in range(y.shape[2]):
+                    known[j] += L[k, i, r] * row[r, j]
+            for j in range(y.shape[2]):
+                row[i, j] = (y[k, i, j] - known[j]) / L[k, i, i]
+            for w in range(count):
+                east, north = row[i, 2 * w], row[i, 2 * w + 1]
+                energy[w, 0, 0] += east * east
+                energy[w, 0, 1] += east * north
+                energy[w, 1, 1] += north * north
+                match[w, 0] += east * white[k, i, 0]
+                match[w, 1] += north * white[k, i, 0]
+    for w in range(count):
+        energy[w, 1, 0] = energy[w, 0, 1]

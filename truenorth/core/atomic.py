@@ -6,7 +6,6 @@ What a command reads it does not write over: the command line names its inputs b
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
 import tempfile
 import threading
@@ -215,7 +214,7 @@ def _second_name(target: Path) -> Path:
 
 def _nameless(folder: Path, target: Path, what: str) -> Path:
     """A hidden name that nobody else has."""
-    return folder / f".{target.stem}.{os.getpid()}-{secrets.token_hex(4)}.{what}{target.suffix}"
+    return folder / f".{target.stem}.{os.getpid()}-{os.urandom(4).hex()}.{what}{target.suffix}"
 
 
 def _onto_disk(path: Path) -> None:

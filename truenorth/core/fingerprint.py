@@ -32,6 +32,9 @@ Remembered = type(cache(len))
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
 
+# Code of functions that were met, and their docstrings: it names no values, and stays the same.
+_described: dict[tuple[CodeType, str | None], str] = {}
+
 
 class UnknownValueError(Exception):
     """A kernel names a value of a kind that the digest does not cover."""
@@ -154,7 +157,10 @@ class _Sources:
         cells = [self.of(cell.cell_contents, names) for cell in function.__closure__ or ()]
         defaults = self.of(function.__defaults__, names)
         home = f"{function.__module__}.{code.co_qualname}"
-        return repr((home, self.of_code(code, function.__doc__, names), named, cells, defaults))
+        seen = code, function.__doc__
+        if seen not in _described:  # kernels call the same functions
+            _described[seen] = self.of_code(code, function.__doc__, names)
+        return repr((home, _described[seen], named, cells, defaults))
 
     def of_code(self, code: CodeType, doc: str | None, names: set[str]) -> str:
         skip = 1 if code.co_consts and isinstance(doc, str) and code.co_consts[0] == doc else 0

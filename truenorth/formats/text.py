@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ Array = NDArray[np.float64]
 LONGEST_LINE = 65536
 MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
+LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
 
@@ -108,8 +110,8 @@ class TextTable:
     @cached_property
     def _rows(self) -> bytes:
         """The text from the first row on."""
-        head = self.text[:LONGEST_HEAD].splitlines(keepends=True)
-        return self.text[sum(map(len, head[: self.skip])) :]
+        ends = [line.end() for line in islice(_lines(self.text), self.skip)]
+        return self.text[ends[-1] :] if ends else self.text
 
     @cached_property
     def _body(self) -> bytes:
@@ -223,10 +225,15 @@ def open_table(path: Path) -> TextTable:
     return _without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
 
 
+def _lines(text: bytes) -> Iterator[re.Match[bytes]]:
+    """The lines of the head one by one, each with its end and, as group 1, without; an empty one may follow the last."""
+    return LINE.finditer(text, 0, LONGEST_HEAD)
+
+
 def _head(path: Path, text: bytes) -> list[tuple[int, str]]:
     """The first lines that are not empty, numbered from 1."""
     lines: list[tuple[int, str]] = []
-    for number, raw in enumerate(text[:LONGEST_HEAD].splitlines(), start=1):
+    for number, raw in enumerate((line[1] for line in _lines(text)), start=1):
         if len(lines) == HEADER_LINES + SAMPLE:
             break
         if b"\0" in raw:
