@@ -11,12 +11,13 @@ of freedom where the gyros are as their specification says (11 on the average of
 are more, the log is aligned with ``M`` among the states, as large as it likes; the gyros are put right by what that finds, and
 aligned anew. A push of waves in step with the tilt makes such a matrix seem, too: :mod:`~truenorth.alignment.put_right`. Of 40
 gyros turned by .3 to 3 deg, or scaled or askew by .3 to 5 %, a push explained .1 to 4 % of what their matrix does, of one more
-12 %; of 32 sound ships, buoys and rafts 20 % and more. In between what the matrix does is in sigma.
+12 %; of 32 sound ships, buoys and rafts 20 % and more. In between, and where late gyros explain as much, what the matrix does is
+in sigma.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -29,6 +30,7 @@ from truenorth.alignment.put_right import hardly_sampled, in_step, likelihood
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.attitude import misalignment
+from truenorth.core.errors import DataError
 from truenorth.errors.staying import PHI
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -38,8 +40,9 @@ from truenorth.state.limits import limit, may_be_chance
 Array = NDArray[np.float64]
 
 ROUNDS = 5  # of matrices left open, the gyros put right by the one before: what yaw alone shows comes last
-OPEN = (0.05, 0.01)  # of a turn, one sigma of each entry where the matrix is left open
+OPEN = (0.01, 0.05)  # of a turn, one sigma of each entry where the matrix is left open
 ONE = np.eye(3, dtype=np.bool_)
+LATE = ("response.gyros_late", "response.gyros_early")
 
 
 Anew = Callable[[ImuRecord, ImuSpec | None], SwayAlignment]
@@ -53,7 +56,9 @@ class _Found(NamedTuple):
     fine: SwayAlignment
 
 
-def gyro_matrix_evidence(fine: SwayAlignment, record: ImuRecord, imu: ImuSpec, anew: Anew) -> list[Evidence]:
+def gyro_matrix_evidence(
+    fine: SwayAlignment, record: ImuRecord, imu: ImuSpec, anew: Anew, others: Sequence[Evidence]
+) -> list[Evidence]:
     """Scale factors and axes of the gyros that explain a log better than any motion of its base, with what they do.
 
     Parameters
@@ -67,18 +72,24 @@ def gyro_matrix_evidence(fine: SwayAlignment, record: ImuRecord, imu: ImuSpec, a
     anew : callable
         Aligns another record about the same attitude, a motion of the same kind fitted anew; with a specification, its matrices are
         states as large as it says.
+    others : sequence of Evidence
+        Found before: late gyros of an indexer that spins steadily are turned by the delay times its rate.
     """
     if hardly_sampled(record) or _explained(fine, imu) < chi_square_limit(limit("matrix"), 9):
         return []
-    # A motion that is fitted anew may be likelier by itself.
-    as_given = max(likelihood(fine), likelihood(anew(record, None)))
-    found = _put_right(record, imu, anew, as_given)
+    try:
+        again = anew(record, None)  # a motion that is fitted anew may be likelier by itself
+        as_given = max(likelihood(fine), likelihood(again))
+        found = _put_right(record, imu, anew, again, as_given)
+    except DataError:  # the filter broke down: with so open a matrix the log says nothing
+        return []
     gained = likelihood(found.fine) - as_given
     pushed = in_step(found.fine)
     if may_be_chance(gained) or pushed > limit("may be pushed") * gained:
         return []
-    in_doubt = pushed > limit("pushed in step") * gained
-    if in_doubt and np.abs(found.M).max() > OPEN[0]:  # no gyro, but what waves do is as large as that
+    late = max((float(item.figures["ratio"]) for item in others if item.key in LATE), default=0.0)
+    in_doubt = pushed > limit("pushed in step") * gained or late > limit("may be pushed") * gained
+    if in_doubt and np.abs(found.M).max() > OPEN[-1]:  # no gyro, but what waves do is as large as that
         return []
     moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, found.fine))))
     if not np.any(moved > limit("negligible") * np.sqrt(np.diag(fine.P)[PHI])):
@@ -97,30 +108,30 @@ def _explained(fine: SwayAlignment, imu: ImuSpec) -> float:
     P = np.linalg.pinv(response.T @ response, hermitian=True)
     M = P @ (response.T @ white[..., 0].ravel())
     known = np.where(ONE, imu.gyro_scale_factor, np.hypot(imu.gyro_misalignment, imu.accel_misalignment)).ravel()
-    return float(M @ np.linalg.solve(P + np.diag(known**2), M))
+    return float(M @ np.linalg.pinv(P + np.diag(known**2), hermitian=True) @ M)
 
 
-def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, as_given: float) -> _Found:
-    """The likeliest matrix of the gyros: of one that is left wide open and one that is less so, round after round.
+def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, again: SwayAlignment, as_given: float) -> _Found:
+    """The likeliest matrix of the gyros: of one that is left a little open and one that is wide open, round after round.
 
     A motion of the base takes a part of a matrix up, and the more so the farther that one may go: wide open it may come to rest
-    where the log is less likely than as given.
+    where the log is less likely than as given. Where a push explains more than the first matrix does, it is none.
     """
-    best = None
+    best = _Found(np.zeros((3, 3)), np.zeros((3, 3)), again)
     for _ in range(ROUNDS):
-        so_far, right, put = as_given, record, ONE.astype(np.float64)
-        if best is not None:
-            so_far, put = likelihood(best.fine), np.asarray(np.linalg.inv(np.eye(3) + best.M), dtype=np.float64)
-            right = replace(record, gyro=record.gyro @ put.T)
-        open_ = [_left_open(anew(right, _opened(imu, size))) for size in OPEN]
-        tried = [_corrected(record, put, M, sigma, anew) for M, sigma in open_]
-        better = max(tried, key=lambda item: likelihood(item.fine))
-        if best is not None and likelihood(better.fine) <= so_far:
+        put = np.asarray(np.linalg.inv(np.eye(3) + best.M), dtype=np.float64)
+        right = replace(record, gyro=record.gyro @ put.T)
+        better = best
+        for size in OPEN:
+            found = _corrected(record, put, *_left_open(anew(right, _opened(imu, size))), anew)
+            better = max(better, found, key=lambda item: likelihood(item.fine))
+            if in_step(better.fine) > likelihood(better.fine) - as_given:
+                return better
+        if better is best:
             break
         best = better
         if in_step(best.fine) <= limit("pushed in step") * (likelihood(best.fine) - as_given):
             break
-    assert best is not None
     return best
 
 

@@ -338,7 +338,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         about, anew = start._replace(C_n0_i=fine.C_n0_i), usual_sway if fine.slow_arm is None else sway_align
         again = lambda log, wide=None: anew(about._replace(record=log), turned=wide or turned, axes=spec)  # noqa: E731
         steps += scale_on_sway_evidence(fine, task.record, again)
-        steps += gyro_matrix_evidence(fine, task.record, used, again)
+        steps += gyro_matrix_evidence(fine, task.record, used, again, steps)
     way = farthest(fine, task.position) if swung else math.inf
     left = _moves_on(task, fine) if swung else None
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, left)

@@ -180,7 +180,7 @@ def align_rotary(
         anew = usual_sway if fine.slow_arm is None else sway_align
         about = start._replace(C_n0_i=fine.C_n0_i)
         again = lambda log, wide=None: anew(about._replace(record=log), mount, wide or _turned(spec))  # noqa: E731
-        evidence += gyro_matrix_evidence(fine, record, spec, again)
+        evidence += gyro_matrix_evidence(fine, record, spec, again, evidence)
     return judged(answer, evidence, heading_limit)
 
 

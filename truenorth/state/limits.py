@@ -234,7 +234,9 @@ LIMITS: dict[str, Limit] = {
         "that a delay explains, that may go with the tilt beyond it: of sound buoys, rafts and ships at the quay it is more",
     ),
     "may be pushed": Limit(
-        0.25, "of the squares", "that a matrix of the gyros explains: with less that goes with the tilt it is in sigma"
+        0.25,
+        "of the squares",
+        "that a matrix of the gyros explains, which a push, or late gyros, may explain as well: it is in sigma then",
     ),
     "matrix": Limit(1e-6, "1", "probability that sound gyros explain as many squares by a matrix of theirs"),
     "vibrates": Limit(
