@@ -67,7 +67,7 @@ def test_what_is_beside_the_archive_says_how_it_is_read(folder):
     np.testing.assert_array_equal(read_imu(path).gyro, read_imu(folder).gyro)
 
 
-@pytest.mark.parametrize("what", ["no log", "damaged", "locked", "too large"])
+@pytest.mark.parametrize("what", ["no log", "damaged", "cut", "locked", "too large"])
 def test_what_cannot_be_read_is_one_message(folder, what, monkeypatch):
     path, said = packed(folder), "damaged"
     whole = path.read_bytes()
@@ -78,6 +78,8 @@ def test_what_cannot_be_read_is_one_message(folder, what, monkeypatch):
     elif what == "damaged":
         middle = len(whole) // 4
         path.write_bytes(whole[:middle] + bytes(64) + whole[middle + 64 :])
+    elif what == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
     elif what == "locked":
         at = whole.index(b"PK\x01\x02") + 8
         path.write_bytes(whole[:at] + b"\x01" + whole[at + 1 :])

@@ -66,13 +66,15 @@ def is_archive(path: Path) -> bool:
 
 
 def _texts(path: Path) -> list[zipfile.ZipInfo]:
-    """Text files of an archive; none of what is no archive, or of one that is cut short: its reader says so."""
+    """Text files of an archive; none of what is no archive, or of a NumPy archive that is cut short: its reader says so."""
     if not is_archive(path):
         return []
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
-    except zipfile.BadZipFile:
+    except zipfile.BadZipFile as error:
+        if path.suffix.lower() == ".zip":
+            raise _damaged(path, error) from None
         return []
     return [m for m in members if Path(m.filename).suffix.lower() in SUFFIXES and not m.filename.startswith("__MACOSX")]
 
@@ -87,12 +89,14 @@ def _unpack(path: Path, members: list[zipfile.ZipInfo], top: Path) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             archive.extractall(top, members)
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, ValueError) as error:
-        raise DataError(f"{path.name}: the zip archive is damaged or cut short ({error}); write it anew") from None
-    except Exception as error:  # zlib, lzma and bz2 have errors of their own
-        if isinstance(error, OSError):
-            raise
-        raise DataError(f"{path.name}: the zip archive is damaged ({error}); write it anew") from None
+    except OSError:
+        raise
+    except Exception as error:  # zipfile, zlib, lzma and bz2 have errors of their own
+        raise _damaged(path, error) from None
+
+
+def _damaged(path: Path, error: Exception) -> DataError:
+    return DataError(f"{path.name}: the zip archive is damaged or cut short ({error}); write it anew")
 
 
 def _chosen(top: Path, part: str) -> Path | None:
