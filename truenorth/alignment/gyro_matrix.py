@@ -17,7 +17,7 @@ in sigma.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import matrix_signatures
 from truenorth.alignment.matched import innovations_of
-from truenorth.alignment.put_right import hardly_sampled, in_step, likelihood
+from truenorth.alignment.put_right import Anew, hardly_sampled, in_step, likelihood
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.attitude import misalignment
@@ -45,15 +45,13 @@ ONE = np.eye(3, dtype=np.bool_)
 LATE = ("response.gyros_late", "response.gyros_early")
 
 
-Anew = Callable[[ImuRecord, ImuSpec | None], SwayAlignment]
-
-
 class _Found(NamedTuple):
     """Entries (3, 3) of the gyros' matrix, their one-sigmas, and the log aligned with them put right."""
 
     M: Array
     sigma: Array
     fine: SwayAlignment
+    pushed: float  # what a push in step with the tilt still explains of it
 
 
 def gyro_matrix_evidence(
@@ -70,25 +68,23 @@ def gyro_matrix_evidence(
     imu : ImuSpec
         Whose gyros may be off by as much as it says.
     anew : callable
-        Aligns another record about the same attitude, a motion of the same kind fitted anew; with a specification, its matrices are
-        states as large as it says.
+        Of :func:`truenorth.alignment.put_right.aligned_anew`.
     others : sequence of Evidence
         Found before: late gyros of an indexer that spins steadily are turned by the delay times its rate.
     """
     if hardly_sampled(record) or _explained(fine, imu) < chi_square_limit(limit("matrix"), 9):
         return []
     try:
-        again = anew(record, None)  # a motion that is fitted anew may be likelier by itself
+        again = anew(record)  # a motion that is fitted anew may be likelier by itself
         as_given = max(likelihood(fine), likelihood(again))
         found = _put_right(record, imu, anew, again, as_given)
     except DataError:  # the filter broke down: with so open a matrix the log says nothing
         return []
     gained = likelihood(found.fine) - as_given
-    pushed = in_step(found.fine)
-    if may_be_chance(gained) or pushed > limit("may be pushed") * gained:
+    if may_be_chance(gained) or found.pushed > limit("may be pushed") * gained:
         return []
     late = max((float(item.figures["ratio"]) for item in others if item.key in LATE), default=0.0)
-    in_doubt = pushed > limit("pushed in step") * gained or late > limit("may be pushed") * gained
+    in_doubt = found.pushed > limit("pushed in step") * gained or late > limit("may be pushed") * gained
     if in_doubt and np.abs(found.M).max() > OPEN[-1]:  # no gyro, but what waves do is as large as that
         return []
     moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, found.fine))))
@@ -117,7 +113,7 @@ def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, again: SwayAlignment
     A motion of the base takes a part of a matrix up, and the more so the farther that one may go: wide open it may come to rest
     where the log is less likely than as given. Where a push explains more than the first matrix does, it is none.
     """
-    best = _Found(np.zeros((3, 3)), np.zeros((3, 3)), again)
+    best = _Found(np.zeros((3, 3)), np.zeros((3, 3)), again, np.inf)
     for _ in range(ROUNDS):
         put = np.asarray(np.linalg.inv(np.eye(3) + best.M), dtype=np.float64)
         right = replace(record, gyro=record.gyro @ put.T)
@@ -125,12 +121,12 @@ def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, again: SwayAlignment
         for size in OPEN:
             found = _corrected(record, put, *_left_open(anew(right, _opened(imu, size))), anew)
             better = max(better, found, key=lambda item: likelihood(item.fine))
-            if in_step(better.fine) > likelihood(better.fine) - as_given:
+            if better.pushed > likelihood(better.fine) - as_given:
                 return better
         if better is best:
             break
         best = better
-        if in_step(best.fine) <= limit("pushed in step") * (likelihood(best.fine) - as_given):
+        if best.pushed <= limit("pushed in step") * (likelihood(best.fine) - as_given):
             break
     return best
 
@@ -142,7 +138,8 @@ def _opened(imu: ImuSpec, size: float) -> ImuSpec:
 def _corrected(record: ImuRecord, put: Array, M: Array, sigma: Array, anew: Anew) -> _Found:
     """The log aligned with its gyros put right by `put` and a matrix that was found after it."""
     put = np.linalg.inv(np.eye(3) + M) @ put
-    return _Found(np.linalg.inv(put) - np.eye(3), sigma, anew(replace(record, gyro=record.gyro @ put.T), None))
+    fine = anew(replace(record, gyro=record.gyro @ put.T))
+    return _Found(np.linalg.inv(put) - np.eye(3), sigma, fine, in_step(fine))
 
 
 def _left_open(found: SwayAlignment) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ from truenorth.core.attitude import UNIFORM_SIGMA, dcm_from_euler, dcm_from_rota
 from truenorth.core.errors import DataError
 from truenorth.errors.axes import known_as_bias
 from truenorth.errors.model import InsModel
-from truenorth.estimate.batch import moved_by, settle
+from truenorth.estimate.batch import OpenPass, settle
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.state.layout import ACCEL_AXES, BA, BG, PHI
 from truenorth.state.state import Start
@@ -48,19 +48,6 @@ class _Motion:
 
     C_nb: Array  # (3, 3) at the start
     values: Array  # (n,) in the places of the states
-
-
-@dataclass(frozen=True)
-class _Pass:
-    """An open loop, and how far off it found its motion to be."""
-
-    track: Track
-    end: Array  # (n,) errors of the motion, as led back to the start
-
-    @property
-    def moved(self) -> float:
-        """The largest of attitude, arms and delays in units of its sigma."""
-        return moved_by(self.end, self.track, [name for name in self.track.layout.names if name.endswith(SITS)])
 
 
 class _Log:
@@ -102,7 +89,7 @@ def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
     model = with_states(task.model, used)
     until = float(task.record.time[0]) + min(carried_for(task.record, model), LONGEST)
 
-    def once(motion: _Motion) -> _Pass:
+    def once(motion: _Motion) -> OpenPass:
         start, level, P, values = _prior(task, first, motion, model)
         off = values - motion.values
         off[PHI] = rotation_vector_from_dcm(level @ motion.C_nb.T)
@@ -120,7 +107,7 @@ def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
         back = _led_back(task, model, found, until)
         error = back.values - motion.values
         error[PHI] = rotation_vector_from_dcm(back.C_nb @ motion.C_nb.T)
-        return _Pass(found, error)
+        return OpenPass(found, error, [name for name in found.layout.names if name.endswith(SITS)])
 
     try:
         last = settle(

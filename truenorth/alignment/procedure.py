@@ -30,12 +30,13 @@ from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
+from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.sway_inference import sway_inferred
-from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align, usual_sway
+from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
 from truenorth.alignment.swung_bias import swung_biases
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
 from truenorth.alignment.turning import (
@@ -335,10 +336,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
-        about, anew = start._replace(C_n0_i=fine.C_n0_i), usual_sway if fine.slow_arm is None else sway_align
-        again = lambda log, wide=None: anew(about._replace(record=log), turned=wide or turned, axes=spec)  # noqa: E731
-        steps += scale_on_sway_evidence(fine, task.record, again)
-        steps += gyro_matrix_evidence(fine, task.record, used, again, steps)
+        anew = aligned_anew(fine, start, turned=turned, axes=spec)
+        steps += scale_on_sway_evidence(fine, task.record, anew)
+        steps += gyro_matrix_evidence(fine, task.record, used, anew, steps)
     way = farthest(fine, task.position) if swung else math.inf
     left = _moves_on(task, fine) if swung else None
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, left)

@@ -9,20 +9,58 @@ right, ``K = K0 + K1 jw + K2 (jw)^2`` along and across, as of :mod:`truenorth.qu
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import SENSORS, seen_of
-from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.matched import innovations_of, whitened
+from truenorth.alignment.swaying import UNKNOWN_ARM, Mount, SwayAlignment, sway_align, usual_sway
 from truenorth.errors.staying import BA, BG
 from truenorth.filters.gains import through
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
 FAST = 0.5  # rad of phase from row to row, at which an angle comes out 2 % too small
+
+
+class Anew(Protocol):
+    """Of :func:`aligned_anew`."""
+
+    def __call__(self, record: ImuRecord, wide: ImuSpec | None = None) -> SwayAlignment:
+        """Align a record; `wide`: as large as that says its sensors' matrices are states."""
+        ...
+
+
+def aligned_anew(
+    fine: SwayAlignment,
+    start: CoarseStart,
+    mount: Mount = UNKNOWN_ARM,
+    turned: ImuSpec | None = None,
+    axes: ImuSpec | None = None,
+) -> Anew:
+    """A function that aligns another record about the attitude of an alignment, a motion of the same kind fitted anew.
+
+    A base that does not swing on lines would else be likelier by its swing, not by what is right in the other record.
+
+    Parameters
+    ----------
+    fine : SwayAlignment
+    start, mount, turned, axes
+        That it was made of, as in :func:`truenorth.alignment.swaying.sway_align`.
+    """
+    align = usual_sway if fine.slow_arm is None else sway_align
+    about = start._replace(C_n0_i=fine.C_n0_i)
+
+    def again(record: ImuRecord, wide: ImuSpec | None = None) -> SwayAlignment:
+        return align(about._replace(record=record), mount, wide or turned, axes)
+
+    return again
 
 
 def hardly_sampled(record: ImuRecord) -> bool:

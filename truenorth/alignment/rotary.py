@@ -28,6 +28,7 @@ from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
+from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align, swinging, usual_sway
@@ -177,10 +178,8 @@ def align_rotary(
     evidence = _of_encoder(record, encoder, axes, task, spec)
     evidence += _of_filter(answer, fine, spec, task, given=given is not None)
     if isinstance(fine, SwayAlignment):
-        anew = usual_sway if fine.slow_arm is None else sway_align
-        about = start._replace(C_n0_i=fine.C_n0_i)
-        again = lambda log, wide=None: anew(about._replace(record=log), mount, wide or _turned(spec))  # noqa: E731
-        evidence += gyro_matrix_evidence(fine, record, spec, again, evidence)
+        anew = aligned_anew(fine, start, mount, _turned(spec))
+        evidence += gyro_matrix_evidence(fine, record, spec, anew, evidence)
     return judged(answer, evidence, heading_limit)
 
 

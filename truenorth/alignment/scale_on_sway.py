@@ -58,8 +58,7 @@ def scale_on_sway_evidence(
     record : ImuRecord
         Of which it is.
     anew : callable
-        Aligns another record about the same attitude, a motion of the same kind fitted anew: a base that does not swing on lines
-        would else be likelier by its swing, not by its accelerometer.
+        Of :func:`truenorth.alignment.put_right.aligned_anew`.
     """
     if hardly_sampled(record):
         return []

@@ -28,7 +28,7 @@ from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_
 from truenorth.alignment.transfer_rows import by_rows
 from truenorth.alignment.transfer_smoothed import LONGEST, flatter_along
 from truenorth.errors.master import ARM, DELAY, FILTER, MOUNTING, TransferModel
-from truenorth.estimate.batch import moved_by, settle
+from truenorth.estimate.batch import OpenPass, settle
 from truenorth.estimate.memory import REOPENED, USED
 from truenorth.quality.stamps import scattered, stamp_scatter
 from truenorth.quality.whiteness import whiteness
@@ -56,19 +56,6 @@ class Found:
     linear: Linear
     nominal: Nominal
     left: float = 0.0  # sigmas that the last pass has still moved what it found by
-
-
-@dataclass(frozen=True)
-class _Pass:
-    """An open loop about a motion, and how far off it found that to be."""
-
-    track: Track
-    end: Array  # (n,) errors of the motion, as led back to the start
-
-    @property
-    def moved(self) -> float:
-        """The largest of attitude, arm, delay and seat in units of its sigma."""
-        return moved_by(self.end, self.track, (DELAY, ARM, MOUNTING))
 
 
 class _Log:
@@ -134,10 +121,10 @@ def found_in_passes(
     part, mounting = handed(noise)[0], model.slice_of(MOUNTING)
     log = _Log(found_by(part, track, model), mounting)
 
-    def open_loop(nominal: Nominal) -> _Pass:
+    def open_loop(nominal: Nominal) -> OpenPass:
         track = once(nominal)
         led_back = found_by(part, track, model)
-        return _Pass(track, nominal.off(led_back.C_nb, led_back.values, mounting))
+        return OpenPass(track, nominal.off(led_back.C_nb, led_back.values, mounting), (DELAY, ARM, MOUNTING))
 
     last = settle(log, open_loop, lambda found: found.moved, enough=SETTLED, most=MOST)
     assert linear is not None

@@ -8,7 +8,7 @@ sways, an indexer, a turntable, and the filters of the rotary paper (whose measu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -135,6 +135,29 @@ def settle(
         before, last, end = by, end, share * end
         del found  # a pass takes memory: none of it stays for the next
         log.correct(end)
+
+
+@dataclass(frozen=True)
+class OpenPass:
+    """An open loop about a motion, and how far off it found that to be.
+
+    Attributes
+    ----------
+    track : Track
+    end : (n,) array
+        Errors of the motion, as led back to the start.
+    constants : sequence of str
+        Groups that must come to rest besides attitude: arms, delays, a seat.
+    """
+
+    track: Track
+    end: Array
+    constants: Sequence[str]
+
+    @property
+    def moved(self) -> float:
+        """The largest of attitude and constants in units of its sigma."""
+        return moved_by(self.end, self.track, self.constants)
 
 
 def moved_by(end: Array, track: Track, names: Iterable[str]) -> float:
