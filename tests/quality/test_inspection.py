@@ -385,6 +385,19 @@ def test_rows_that_are_held_are_found_though_their_channels_repeat_by_themselves
     assert "repeated_rows" not in codes(inspect(quiet))
 
 
+@pytest.mark.parametrize("again", [0.0, 0.07])
+def test_rows_written_again_stand_out_of_what_coarse_steps_repeat(again):
+    """Channels that repeat in a fifth to four fifths of the rows make one in a hundred repeat at once; others are written twice."""
+    rng = np.random.default_rng(8)
+    count = 30_000
+    counts = np.round(rng.standard_normal((count, 6)) * [1.2, 1.3, 0.7, 0.3, 1.0, 0.25])
+    rows = np.sort(np.concatenate([np.arange(count), np.flatnonzero(rng.random(count) < again)]))[:count]
+    counts = counts[rows] * [1e-5] * 6 + [0.0, 0.0, 0.0, 0.0, 0.0, 9.8e-2]
+    found = inspect(ImuRecord(0.01 * np.arange(1, count + 1), counts[:, :3], counts[:, 3:], "increments"))
+    assert found.sampling.repeated_rows > 100
+    assert ("repeated_rows" in codes(found, "warning")) == bool(again)
+
+
 def test_noise_that_is_clipped_on_one_side_alone():
     """No range has sides so unlike; but of values with many digits no two are alike by chance."""
     record = base(duration=60.0)

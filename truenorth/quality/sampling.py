@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truenorth.core.remembered import remembered
 from truenorth.quality.again import Again, rows_again
 from truenorth.quality.packets import exchanged_packets
+from truenorth.quality.repeats import chance_of_repeat, repeats_of
 from truenorth.quality.stuck import stands_alone
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.limits import limit
@@ -20,12 +21,10 @@ from truenorth.state.limits import limit
 Array = NDArray[np.float64]
 Severity = Literal["error", "warning", "note"]
 
-FEWEST_RUNS, EVENLY = 200, 0.5  # runs of such rows, and of the variance that chance gives their lengths
 ROUNDING = 1e-10  # of a sensor's largest value: what varies by less has no noise
 NOISELESS = 1e-7  # of the same: noise and quantum of every sensor are larger
 FEWEST = 20  # rows that say whether there is noise
 FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
-BLOCK = 1000  # rows over which the chance of a repeat is counted
 SATURATED_RUN = 3  # rows at the extreme, one after the other ...
 RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off, ...
 TAIL, TAIL_LEVELS = 0.25, 20  # ... and more where a tail of so many levels, in this part of the spread, is cut off
@@ -161,30 +160,18 @@ def _again(record: ImuRecord, again: Again) -> Finding:
 
 
 def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding]) -> int:
-    repeated = int(np.count_nonzero(same.all(axis=0)))
-    chance = float(np.prod(_chance_of_repeat(same))) * same.shape[1]
-    # Samples that are held repeat in all channels at once; quiet ones of a coarse quantum repeat each by itself.
-    share, least = repeated / same.shape[1], float(same.mean(axis=1).min())
-    held = share > limit("held rows") and (share > 0.98 * least or _evenly(same)) and chance < 0.9 * repeated
-    if held or repeated > 3 + 5.0 * chance + limit("repeated rows") * same.shape[1]:
-        share = 100.0 * repeated / len(record)
+    repeated, beyond = repeats_of(same)
+    if beyond:
+        share = 100.0 * beyond
         findings.append(
             Finding(
                 "warning" if share > 5.0 else "note",
                 "repeated_rows",
-                f"{repeated} rows ({share:.1f} %) repeat the row before in all six channels; expected new values in "
+                f"{repeated} rows ({share:.1f} % beyond chance) repeat the row before in all six channels; expected new values in "
                 "each row: the log may be written faster than the sensor samples; log at the sensor's rate",
             )
         )
     return repeated
-
-
-def _evenly(same: NDArray[np.bool_]) -> bool:
-    """Whether rows that repeat come in runs of one length: chance makes runs of all lengths, geometrically distributed."""
-    repeats = same.all(axis=0)
-    runs = np.diff(np.flatnonzero(~repeats)) - 1.0
-    share = float(repeats.mean())
-    return len(runs) > FEWEST_RUNS and float(np.var(runs)) < EVENLY * share / (1.0 - share) ** 2
 
 
 def _exchanged(record: ImuRecord, data: Sequence[Array]) -> list[Finding]:
@@ -208,7 +195,7 @@ def _frozen(
     record: ImuRecord, data: Sequence[Array], same: NDArray[np.bool_], findings: list[Finding]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Longest run of each channel and where it begins; a finding where chance does not explain it."""
-    chance = np.minimum(_chance_of_repeat(same), 0.98)
+    chance = np.minimum(chance_of_repeat(same), 0.98)
     by_chance = np.log(len(record)) / -np.log(np.maximum(chance, 1e-3))
     runs, at = np.empty(6, dtype=np.intp), np.empty(6, dtype=np.intp)
     for channel, name in enumerate(COLUMNS[record.kind]):
@@ -385,14 +372,3 @@ def _finest(values: Array) -> float:
     steps = np.diff(np.unique(values))
     rounding = ROUNDING * float(np.abs(values).max(initial=0.0))
     return float(np.min(steps, initial=np.inf, where=steps > rounding))
-
-
-def _chance_of_repeat(same: NDArray[np.bool_]) -> Array:
-    """(6,) probability that a value equals the one before: that of the steadiest tenth of the record.
-
-    The steadiest, because a quantised sensor repeats most at rest, and a record may be at rest only in part.
-    """
-    blocks = max(1, same.shape[1] // BLOCK)
-    length = same.shape[1] // blocks
-    share = same[:, : blocks * length].reshape(6, blocks, length).mean(axis=2)
-    return np.asarray(np.quantile(share, 0.9, axis=1))

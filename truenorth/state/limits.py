@@ -138,6 +138,11 @@ LIMITS: dict[str, Limit] = {
         "that have changed places, above which it is an error: fewer move the means of a log by less than noise does",
     ),
     "repeated rows": Limit(0.002, "of the rows", "that repeat the one before, beyond those that chance gives"),
+    "rows written again": Limit(
+        0.01,
+        "of the rows",
+        "that repeat the one before in three of four parts of a log, where coarse steps repeat many by chance",
+    ),
     "held rows": Limit(
         0.1,
         "of the rows",
