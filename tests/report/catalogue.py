@@ -18,8 +18,9 @@ import truenorth
 from tests.sources import nodes_of, text_of
 from truenorth.core.language import FOLDER, FRAME, LANGUAGES
 from truenorth.report.words import WHY, WORDS
-from truenorth.state.english import SENTENCES, TITLES
+from truenorth.state.english import SENTENCES
 from truenorth.state.remedies import REMEDIES, TERMS
+from truenorth.state.titles import TITLES
 
 HOME = Path(truenorth.__file__).parent
 # Arrays and models of one's own code: their messages are for those who write Python, and stay English.

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truenorth.state.english import SENTENCES, TITLES
+from truenorth.state.english import SENTENCES
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, OUTPUTS, Effect, Evidence, contradiction, note
 from truenorth.state.judge import Claim, judge, weight
 from truenorth.state.limits import limit
 from truenorth.state.remedies import REMEDIES
+from truenorth.state.titles import TITLES
 from truenorth.state.wording import headline, sentence
 
 RANK = {"good": 0, "level_only": 1, "not_converged": 2, "not_observable": 2, "inconsistent": 3}

@@ -28,6 +28,7 @@ from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
 from truenorth.alignment.in_motion_verdict import judge_moving
+from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.suspect import name_specification
@@ -289,7 +290,8 @@ def _seen(
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
     if gyrocompassed:
-        found += [*rest_evidence(task, track), *half_turn_evidence(task, track, gated=gated)]
+        found += [*rest_evidence(task, track), *led_at_rest_evidence(task, track)]
+        found += half_turn_evidence(task, track, gated=gated)
 
     def other(record: ImuRecord) -> Track:
         return replace(task, record=record).run(guess, gated=gated)

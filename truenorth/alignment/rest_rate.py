@@ -17,16 +17,13 @@ from truenorth.alignment.task import make_task
 from truenorth.alignment.verdict import rate_evidence
 from truenorth.coarse.inertial import oba
 from truenorth.errors.staying import StaticModel
-from truenorth.navigation.stops import seconds_at_rest
+from truenorth.navigation.stops import longest_rest, seconds_at_rest
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import BG, PHI
 from truenorth.state.track import Track
 from truenorth.strapdown.inertial import integrate
 
 Array = NDArray[np.float64]
-
-LONG_ENOUGH = 30.0  # s: of fewer epochs a filter does not separate a base's motion from its rate
-APART = 1.5  # s: seconds further apart are two rests
 
 
 def rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
@@ -38,10 +35,8 @@ def rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
     track : Track
         Of the log: it says how far biases of the gyros turn the heading at its end.
     """
-    seconds = np.sort(np.concatenate(seconds_at_rest(task.record, task.odometer, task.gnss)))
-    rests = np.split(seconds, np.flatnonzero(np.diff(seconds) > APART) + 1)
-    longest = max(rests, key=len)
-    if len(longest) < LONG_ENOUGH:
+    longest = longest_rest(*seconds_at_rest(task.record, task.odometer, task.gnss))
+    if not len(longest):
         return []
     rest = make_task(task.record.between(longest[0] - 0.5, longest[-1] + 0.5), task.position, None)
     lat, noise = task.position.lat, StaticModel.of(task.spec)

@@ -80,7 +80,7 @@ def explain_compiling() -> None:
 def in_reader_s_words(status: str) -> str:
     """A status as programs read it, and what it means where the reader's language is another."""
     from truenorth.core.language import language
-    from truenorth.state.english import TITLES
+    from truenorth.state.titles import TITLES
 
     return status if language() == "en" else f"{status} {_(TITLES[status])}"
 

@@ -30,6 +30,8 @@ SHARP = 0.4  # of the speed of standing: one sigma of a slope that is sharp enou
 STANDING_PULSES = 1.5  # pulses of an odometer in a second: no more is standing
 LEAST_ANGLE = 1e-9  # rad: of a simulated IMU that nothing shakes
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
+LONG_ENOUGH = 30.0  # s: of fewer epochs a filter does not separate a base's motion from its rate
+APART = 1.5  # s: seconds further apart are two rests
 SPREAD = 0.25  # s before and after the middle of a second at rest, between which its row is drawn
 
 
@@ -82,6 +84,13 @@ def seconds_at_rest(
         moved = sum(_near(at, time[moves]) for time, moves in speeds)
         agreed.append(at[(looked > 0) & (moved == 0)])
     return agreed[0], agreed[1]
+
+
+def longest_rest(*seconds: Array) -> Array:
+    """Middles of the seconds (m,) of the longest rest among seconds at rest, in any order; empty where it is too short to align."""
+    all_of = np.sort(np.concatenate(seconds))
+    longest = max(np.split(all_of, np.flatnonzero(np.diff(all_of) > APART) + 1), key=len)
+    return longest if len(longest) >= LONG_ENOUGH else all_of[:0]
 
 
 def _near(at: Array, times: Array) -> NDArray[np.intp]:

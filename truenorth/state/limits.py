@@ -138,6 +138,11 @@ LIMITS: dict[str, Limit] = {
         "that have changed places, above which it is an error: fewer move the means of a log by less than noise does",
     ),
     "repeated rows": Limit(0.002, "of the rows", "that repeat the one before, beyond those that chance gives"),
+    "led at rest": Limit(
+        5.0,
+        "sigma",
+        "that headings of a log differ, as of a vehicle at rest and with aids that move it, before the aids are wrong",
+    ),
     "rows written again": Limit(
         0.01,
         "of the rows",

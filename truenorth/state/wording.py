@@ -14,9 +14,10 @@ from typing import Any
 
 from truenorth.core.language import retold, translated
 from truenorth.core.units import parse_unit, significant
-from truenorth.state.english import SENTENCES, TITLES
+from truenorth.state.english import SENTENCES
 from truenorth.state.evidence import Evidence
 from truenorth.state.remedies import REMEDIES, TERMS
+from truenorth.state.titles import TITLES
 
 
 class _Figures(string.Formatter):
