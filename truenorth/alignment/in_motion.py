@@ -20,7 +20,7 @@ from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_axes import half_turn_evidence
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
-from truenorth.alignment.in_motion_learnt import learnt_evidence
+from truenorth.alignment.in_motion_learnt import learnt_evidence, noise_factors
 from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
 from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more
@@ -184,9 +184,10 @@ def _aligned(
     else:
         why = "asked for"
     found, spread = _begun(task, method, tell)
-    louder, _ = task.learnt(found.track)
-    if any(float(factor.max()) > LOUD for factor in louder.factors.values()):  # what it found was made of noise
-        task = replace(task, factors=louder.factors)
+    louder = noise_factors(found.track, task.aiding(gated=False), task.factors, tails=True)
+    pass
+    if any(float(factor.max()) > LOUD for factor in louder.values()):  # what it found was made of noise
+        task = replace(task, factors=louder)
         found, spread = _begun(task, method, tell)
     first, bank, number, much = found.guess, spread, 1, False
     while number < passes or ((much or not found.settled) and passes > 1 and number < passes + MORE_PASSES):

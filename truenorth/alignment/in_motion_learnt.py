@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
 from truenorth.estimate.latency import SHOWN_DELAY
+from truenorth.navigation.stops import STANDING
 from truenorth.quality.whiteness import FEWEST
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.limits import limit
@@ -27,11 +28,15 @@ from truenorth.state.track import Residuals, Track
 Array = NDArray[np.float64]
 
 LEAST_FACTOR = 1.15  # of sigma: less is what a usual value is worth
-MEDIAN = 0.4549  # of chi-square with one degree of freedom
+# Chi-square with one degree of freedom: half of all are smaller than the first, four fifths than the second. Noise with long tails
+# has the larger scale by the second; a sixth of the rows may be outliers.
+QUANTILES = {0.5: 0.4549, 0.8: 1.6424}
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
 
 
-def noise_factors(track: Track, aiding: Sequence[Aiding], before: Mapping[str, Array]) -> dict[str, Array]:
+def noise_factors(
+    track: Track, aiding: Sequence[Aiding], before: Mapping[str, Array], *, tails: bool = False
+) -> dict[str, Array]:
     """By how much the noise of each source is larger than it says, (3,) by component; those that say enough are left out.
 
     Parameters
@@ -41,18 +46,41 @@ def noise_factors(track: Track, aiding: Sequence[Aiding], before: Mapping[str, A
     aiding : sequence of Aiding
     before : mapping
         Factors that are in their sigmas already.
+    tails : bool
+        Whether rows far out count, too, as they do in a pass that has no gate.
     """
     sources = {source.name: source for source in aiding if source.does == "measurement"}
     found = {}
     for residuals in track.residuals:
         had = before.get(residuals.name, np.ones(3))
-        factor = had * _factors(residuals, sources[residuals.name], 1.0 / had)
+        source = sources[residuals.name]
+        whole, moving = (
+            _factors(part, source, 1.0 / had, tails) for part in (residuals, _on_the_move(residuals, track))
+        )
+        factor = had * np.maximum(whole, moving)
         if factor.max() > LEAST_FACTOR:
             found[residuals.name] = factor
     return found
 
 
-def _factors(residuals: Residuals, source: Aiding, least: Array) -> Array:
+def _scale_of(squares: Array) -> float:
+    """The larger scale of squares by two of their quantiles."""
+    return max(float(np.quantile(squares, share)) / usual for share, usual in QUANTILES.items())
+
+
+def _on_the_move(residuals: Residuals, track: Track) -> Residuals:
+    """Those of a vehicle that moves: a wheel that stands is exact, and says nothing of its noise."""
+    speed = np.linalg.norm(track.v_n, axis=1)
+    moves = np.interp(residuals.stamp, track.time, speed) > STANDING
+    return replace(
+        residuals,
+        innovation=residuals.innovation[moves],
+        sigma=residuals.sigma[moves],
+        stamp=residuals.stamp[moves],
+    )
+
+
+def _factors(residuals: Residuals, source: Aiding, least: Array, tails: bool) -> Array:
     """(3,) by how much sigma is too small by the white part of the innovations; `least` where they are smaller."""
     order = np.argsort(source.time, kind="stable")
     row = order[np.clip(np.searchsorted(source.time[order], residuals.stamp), 0, len(order) - 1)]
@@ -63,7 +91,7 @@ def _factors(residuals: Residuals, source: Aiding, least: Array) -> Array:
         there = np.isfinite(difference)
         if int(there.sum()) < FEWEST:
             continue
-        q = float(np.median(difference[there])) / MEDIAN
+        q = float(np.mean(difference[there])) if tails else _scale_of(difference[there])
         if abs(q - 1.0) < limit("chance") * SPREAD / math.sqrt(there.sum()):
             continue
         known = np.isfinite(e[:, axis]) & (R[:, axis] > 0.0)
