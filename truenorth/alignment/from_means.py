@@ -32,6 +32,7 @@ from truenorth.strapdown.level import inertial_integrals
 Array = NDArray[np.float64]
 
 SHORTEST_FILTER = 20.0  # s: below that a filter cannot tell the base's motion from tilt
+STEADY = 20.0  # times the scatter of a mean rate over parts of the log
 WINDOW = 10.0  # s, over which a wander of the attitude is taken
 WANDER = 1.0 / 15.0  # of a random walk N over T about its line: N sqrt(T / 15)
 
@@ -74,6 +75,9 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     AlignmentError
         Gyros that read zero in every row.
     """
+    whole = check_means(task.means, task.position.lat, task.gravity)
+    # A base that turns by itself does so more in one part of the log than in another; what is steady is the gyros'.
+    steady = spec is not None and float(np.hypot(*whole.rate_residual)) > STEADY * float(np.max(whole.rate_noise))
     task = last_part(task)
     if not task.record.gyro.any():
         raise AlignmentError(
@@ -82,7 +86,7 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     check = check_means(task.means, task.position.lat, task.gravity)
     used, where = specification(spec, check, lambda: _louder(allan_noise(task.record), turning_noise(task.record)))
     moves = _wander(task, used) > _drift(task, used)
-    check = _check(task, task.means, moves)
+    check = whole if steady else _check(task, task.means, moves)
     means, moved = _at_the_epoch(task, used)
     C_nb = level_of(means.f_b)
     P = task.bias_prior(used, C_nb.T)
