@@ -21,14 +21,15 @@ SEED = 41  # any
 T = np.arange(400.0)
 
 
-def track_of(innovation, sigma):
+def track_of(innovation, sigma, speed=10.0):
+    """Of a vehicle with a speed (M,), m/s, whose sources say so."""
     yes = np.ones(len(T), bool)
     nis = np.sum((innovation / sigma) ** 2, axis=1)
     residuals = Residuals("log", T, innovation, sigma, nis, yes, 0, T, ~yes)
-    none = np.zeros((0, 3))
-    return Track(
-        np.zeros(0), np.zeros((0, 3, 3)), none, none, np.zeros((0, 15)), np.zeros((0, 15, 15)), Layout(), (residuals,)
-    )
+    v_n, place, sensors = np.zeros((len(T), 3)), np.zeros((len(T), 3)), np.zeros((len(T), 15))
+    v_n[:, 1] = speed
+    P = np.tile(np.eye(15), (len(T), 1, 1))
+    return Track(T, np.tile(np.eye(3), (len(T), 1, 1)), v_n, place, sensors, P, Layout(), (residuals,))
 
 
 @pytest.mark.parametrize("factor", [1.0, 2.0, 6.0])
@@ -47,6 +48,30 @@ def test_noise_is_what_is_white_in_innovations(factor):
     assert found["log"] == pytest.approx([factor, 1.0, 1.0], rel=0.15)
     assert changed({}, found)
     assert not changed(found, {"log": 1.05 * found["log"]})
+
+
+def test_a_wheel_that_stands_says_nothing_of_its_noise():
+    """Exact for two thirds of the log, at rest, and four times as noisy as it says on the move."""
+    rng = np.random.default_rng(SEED)
+    moves = 0.66 * T[-1] < T
+    noise = np.where(moves, 4.0, 0.01)[:, None] * rng.standard_normal((len(T), 3))
+    source = Aiding("log", "velocity", T, np.zeros((len(T), 3)), np.ones((len(T), 3)))
+    found = noise_factors(track_of(noise, np.ones((len(T), 3)), 10.0 * moves), [source], {})
+    assert found["log"] == pytest.approx([4.0] * 3, rel=0.25)
+
+
+@pytest.mark.parametrize("tails", [False, True])
+def test_noise_with_long_tails(tails):
+    """A third of the rows three times as noisy; two in a hundred, a hundred times, are outliers, unless tails are asked for."""
+    rng = np.random.default_rng(SEED)
+    kind = rng.random(len(T))
+    sigma = np.where(kind < 0.02, 100.0, np.where(kind < 0.35, 3.0, 1.0))[:, None]
+    source = Aiding("log", "velocity", T, np.zeros((len(T), 3)), np.ones((len(T), 3)))
+    found = noise_factors(
+        track_of(sigma * rng.standard_normal((len(T), 3)), np.ones((len(T), 3))), [source], {}, tails=tails
+    )
+    assert np.all(found["log"] > (5.0 if tails else 1.3))
+    assert tails or np.all(found["log"] < 2.5)
 
 
 def car(name, run=0):

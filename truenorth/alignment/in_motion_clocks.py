@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
+import numpy as np
+
+from truenorth.alignment.in_motion_passes import begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.latency import SHOWN_DELAY, delay_of
+from truenorth.estimate.latency import SHOWN_DELAY, counted_from, delay_of
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
@@ -16,7 +20,10 @@ from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.state.evidence import Effect, Evidence, Kind
 from truenorth.state.limits import limit, may_be_chance
 from truenorth.state.mounting import Mounting
-from truenorth.state.track import Track
+from truenorth.state.track import Residuals, Track
+
+MORE_PASSES = 4  # of a log whose clocks are left open
+CLOCK_DIGITS = 6  # of a stamp, s
 
 
 def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool) -> list[Evidence]:
@@ -35,15 +42,14 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         shut[log] = (log.split()[0], task.wheel)
     shut = {name: (key, m) for name, (key, m) in shut.items() if m.latency_sigma == 0.0}
     if shut:
-        open_ = replace(task, antenna=_opened(task.antenna), wheel=_opened(task.wheel))
         try:
-            late = open_.run(guess, gated=gated)
+            open_, guess, late, ratio = _of_open_clocks(task, guess, track, first, gated=gated)
         except DataError:  # the filter broke down: no explanation
             return []
-        ratio = likelihood_ratio(track.residuals, late.residuals)
         if ratio > limit("rival"):
             kind: Kind = "hint" if may_be_chance(ratio) else "known"
-            lags = {name: delay_of(late, name) for name in shut}
+            counted = counted_from(late, "GNSS", open_.antenna.latency - task.antenna.latency)
+            lags = {name: delay_of(counted, name) for name in shut}
             off = {name: lag for name, lag in lags.items() if lag is not None and abs(lag[0]) > SHOWN_DELAY * lag[1]}
             whole = moved(track, late)
             share = Effect(*(size / math.sqrt(max(len(off), 1)) for _, size in whole.items()))
@@ -66,6 +72,50 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         return rival.run(led_back(once, backtracked(record, once), task.spec, first), gated=gated)
 
     return found + gyro_delay_evidence(other, track, task.record)
+
+
+class _Opened(NamedTuple):
+    """The task with its aids' clocks left open, where it begins, its track, and how much likelier than the one with clocks shut."""
+
+    task: MovingTask
+    guess: Guess
+    track: Track
+    ratio: float
+
+
+def _of_open_clocks(task: MovingTask, guess: Guess, track: Track, first: Guess, *, gated: bool) -> _Opened:
+    """The log with clocks left open.
+
+    What passes with shut clocks have learnt of noise may be the work of a clock. Passes of its own learn anew then; with what they
+    have learnt, and no gate, the log tells shut clocks from open ones.
+    """
+    open_ = replace(task, antenna=_opened(task.antenna), wheel=_opened(task.wheel))
+    late = open_.run(guess, gated=gated)
+    ratio = likelihood_ratio(track.residuals, late.residuals)
+    if not task.factors and not task.scatter:
+        return _Opened(open_, guess, late, ratio)
+    anew = replace(open_, factors={}, scatter=0.0, scattered={})
+    found = begun(anew, first, anew.run(first, gated=False))
+    for _ in range(MORE_PASSES):
+        anew, much = anew.learnt(found.track)
+        found = once_more(anew, found, first)
+        if not much and found.settled:
+            break
+    shut = replace(anew, antenna=task.antenna, wheel=task.wheel)
+    both = (_as_stamped(tried, tried.run(found.guess, gated=False)) for tried in (shut, anew))
+    anew_ratio = likelihood_ratio(*both)
+    return (
+        _Opened(anew, found.guess, found.track, anew_ratio)
+        if anew_ratio > ratio
+        else _Opened(open_, guess, late, ratio)
+    )
+
+
+def _as_stamped(task: MovingTask, track: Track) -> list[Residuals]:
+    """Residuals with the stamps of their logs, which the latency of a sensor has moved."""
+    lags = [("GNSS", task.antenna.latency), ("odometer", task.wheel.latency), ("velocity log", task.wheel.latency)]
+    moved_by = [(r, sum(lag for name, lag in lags if r.name.startswith(name))) for r in track.residuals]
+    return [replace(r, stamp=np.round(r.stamp + lag, CLOCK_DIGITS)) for r, lag in moved_by]
 
 
 def _opened(mounting: Mounting) -> Mounting:
