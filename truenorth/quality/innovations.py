@@ -147,8 +147,10 @@ def _growth(source: Residuals, sigma: Effect, by_motion: bool) -> list[Evidence]
         return []
     more = dict.fromkeys(("velocity", "position"), math.sqrt(found.growth**2 - 1.0))
     more |= dict.fromkeys(("heading", "level"), math.sqrt(found.of_attitude**2 - 1.0))
-    # Errors of places last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude.
-    touched: tuple[str, ...] = ("position",) if source.unit == "m" else OUTPUTS
+    # Errors of places last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude: receivers that smooth
+    # their fixes have hardly anything else, which is no reason to refuse a log.
+    places = source.unit == "m"
+    touched: tuple[str, ...] = ("position",) if places else OUTPUTS
     if by_motion and source.name in BODY:
         touched = ("level", "velocity", "position")
     effect = Effect(
@@ -160,4 +162,4 @@ def _growth(source: Residuals, sigma: Effect, by_motion: bool) -> list[Evidence]
         "colour": found.colour,
         "growth": found.growth,
     }
-    return [Evidence("innovations.coloured", figures, "known", effect)]
+    return [Evidence("innovations.coloured", figures, "hint" if places else "known", effect)]
