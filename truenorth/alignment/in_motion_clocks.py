@@ -60,12 +60,12 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         task = replace(task, sprung=True)
         track = task.run(guess, gated=gated)
 
-    def other(record: ImuRecord) -> Track:
-        rival = replace(task, record=record)
-        once = rival.run(guess, gated=gated)
-        return rival.run(led_back(once, backtracked(record, once), task.spec, first), gated=gated)
+    def led_by(record: ImuRecord, other: ImuRecord) -> Track:
+        once = replace(task, record=other).run(guess, gated=gated)
+        begin = led_back(once, backtracked(other, once), task.spec, first)
+        return replace(task, record=record).run(begin, gated=gated)
 
-    return found + gyro_delay_evidence(other, track, task.record)
+    return found + gyro_delay_evidence(lambda record: led_by(record, record), track, task.record, led_by)
 
 
 def _opened(mounting: Mounting) -> Mounting:
