@@ -54,8 +54,7 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
     delays = {
         name: (sensor.latency + found[0], found[1])
         for name, sensor in late.items()
-        if sensor is not None
-        and (found := delay_of(track, name)) is not None and is_estimated(found[1], found[2])
+        if sensor is not None and (found := delay_of(track, name)) is not None and is_estimated(found[1], found[2])
     }
     # Navigation goes on from there: what heading is less sure of belongs to it, too.
     less_sure = covariance[2, 2] - history.phi_covariance[-1][2, 2]

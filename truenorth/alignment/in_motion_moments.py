@@ -6,7 +6,9 @@ epoch. Of the cart of `stim300_cart_chicago` places alone are .84 s late and vel
 both lies between the two, is known twice as well as either, and is neither.
 
 So two delays are asked for once the passes have settled. A likelihood ratio says whether there are two: the second has its own
-prior, so a sound log exceeds c in less than exp(-c / 2) of cases (Markov's inequality). Then each has its own state in all passes.
+prior, so a sound log exceeds c in less than exp(-c / 2) of cases (Markov's inequality). Where one delay has the gate reject rows
+that two do not, the rows that both take say nothing of it, and rejected ones count as much as the gate allows. Then each delay has
+its own state in all passes.
 
 Source: NovAtel, "OEM6 Family Firmware Reference Manual" (OM-20000129), BESTVEL: latency of the velocity's time tag.
 """
@@ -18,7 +20,9 @@ from truenorth.alignment.in_motion_start import Guess
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import likelihood_ratio
+from truenorth.estimate.slow_fit import bounded_misfit
 from truenorth.state.limits import limit
+from truenorth.state.track import Track
 
 MOST = 6  # passes, until both delays have settled
 
@@ -30,7 +34,7 @@ def two_moments(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask
         return task, found
     try:
         track = apart.run(found.guess, gated=True)
-        if likelihood_ratio(found.track.residuals, track.residuals) <= limit("rival"):
+        if not _explains(track, found.track):
             return task, found
         other = found
         for _ in range(MOST):
@@ -42,3 +46,11 @@ def two_moments(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask
     except DataError:  # the filter broke down: they are of one moment
         return task, found
     return apart, other
+
+
+def _explains(track: Track, one: Track) -> bool:
+    """Whether two delays explain the log better than one."""
+    if likelihood_ratio(one.residuals, track.residuals) > limit("rival"):
+        return True
+    fewer = sum(r.rejected for r in track.residuals) < sum(r.rejected for r in one.residuals)
+    return fewer and bounded_misfit(one.residuals) - bounded_misfit(track.residuals) > limit("rival")

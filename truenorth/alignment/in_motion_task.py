@@ -108,7 +108,8 @@ class MovingTask:
         scatter = stamp_scatter(track, aiding, self.scatter)
         later = antenna is not self.antenna or velocities is not self.velocities
         arm = self._arm(track)
-        unseen = unseen_swing(track, self.record, arm, self.unseen)
+        given = self.antenna.latency_sigma == 0.0
+        unseen = 0.0 if given else unseen_swing(track, self.record, arm, self.unseen)
         scatters = differs(self.scatter, scatter) or differs(self.unseen, unseen)
         much = later or changed(self.factors, factors) or scatters
         if not much:
@@ -140,7 +141,7 @@ class MovingTask:
         )
 
     def with_velocities_apart(self) -> MovingTask:
-        """The task whose receiver shows velocities as late as they are: the same one where that is asked for, given or no question."""
+        """The task whose receiver's velocities have a delay of their own: the same one where they have, or where it is given."""
         both = has_fixes(self.gnss) and bool(self.gnss.has_velocity.any())
         if not both or self.antenna.latency_sigma == 0.0 or self.velocities is not None:
             return self

@@ -6,7 +6,9 @@ receiver hardly any. What is predicted of that is noise then, on rough ground al
 the rest by a delay that was twenty of its sigmas off, or by a shorter arm.
 
 A share k of the swing, its RMS over the interval about a row, is added to the sigmas of velocities. It is the likeliest one, by
-differences of innovations as the scatter of stamps (:mod:`truenorth.quality.stamps`), and none where chance explains it.
+differences of innovations as the scatter of stamps (:mod:`truenorth.quality.stamps`), and none where chance explains it. A
+receiver that shows nothing of the swing has a share of 1. One that shows that of another moment has the root of 2, both swings
+count: so nothing is learnt where a delay is given, since one that is wrong would hide in it.
 
 The rule is ours.
 """
