@@ -22,6 +22,7 @@ from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence, noise_factors
 from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
+from truenorth.alignment.in_motion_moments import two_moments
 from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_spread import Spread
@@ -196,6 +197,8 @@ def _aligned(
             tell(f"pass {number + 1}")
             found = once_more(task, found, first)
         number += 1
+    if passes > 1:
+        task, found = two_moments(task, found, first)
     for _ in range(SLOW_PASSES if passes > 1 else 0):
         slower = task.with_slow_errors(found.track)
         if slower is task:

@@ -66,12 +66,12 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         task = replace(task, sprung=True)
         track = task.run(guess, gated=gated)
 
-    def other(record: ImuRecord) -> Track:
-        rival = replace(task, record=record)
-        once = rival.run(guess, gated=gated)
-        return rival.run(led_back(once, backtracked(record, once), task.spec, first), gated=gated)
+    def led_by(record: ImuRecord, other: ImuRecord) -> Track:
+        once = replace(task, record=other).run(guess, gated=gated)
+        begin = led_back(once, backtracked(other, once), task.spec, first)
+        return replace(task, record=record).run(begin, gated=gated)
 
-    return found + gyro_delay_evidence(other, track, task.record)
+    return found + gyro_delay_evidence(lambda record: led_by(record, record), track, task.record, led_by)
 
 
 class _Opened(NamedTuple):
@@ -94,7 +94,7 @@ def _of_open_clocks(task: MovingTask, guess: Guess, track: Track, first: Guess, 
     ratio = likelihood_ratio(track.residuals, late.residuals)
     if not task.factors and not task.scatter:
         return _Opened(open_, guess, late, ratio)
-    anew = replace(open_, factors={}, scatter=0.0, scattered={})
+    anew = replace(open_, factors={}, scatter=0.0, unseen=0.0, scattered={})
     found = begun(anew, first, anew.run(first, gated=False))
     for _ in range(MORE_PASSES):
         anew, much = anew.learnt(found.track)

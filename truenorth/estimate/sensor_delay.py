@@ -38,13 +38,21 @@ LOOSE = 1e3  # times as noisy as it is: it counts for nothing
 CLIMBS = 3  # from one delay to a likelier one: with the first taken off fewer measurements seem to be outliers
 
 
-def gyro_delay_evidence(run: Callable[[ImuRecord], Track], first: Track, record: ImuRecord) -> list[Evidence]:
+def gyro_delay_evidence(
+    run: Callable[[ImuRecord], Track],
+    first: Track,
+    record: ImuRecord,
+    led_by: Callable[[ImuRecord, ImuRecord], Track] | None = None,
+) -> list[Evidence]:
     """Whether gyros that are taken earlier or later explain the measurements better, and what that does to the answer.
 
     Parameters
     ----------
     run, first, record
         As of :func:`truenorth.estimate.rivals.jump_evidence`.
+    led_by : callable, optional
+        A record from where `run` has begun its last pass with a second one. Where heading is hardly known, errors are linear about
+        another beginning, too, and that alone may explain the log better: gyros without the delay have the same choice.
 
     Returns
     -------
@@ -54,7 +62,7 @@ def gyro_delay_evidence(run: Callable[[ImuRecord], Track], first: Track, record:
     """
     rows, track, ratio = 0, first, 0.0
     for _ in range(CLIMBS):
-        step = _likelier(run, track, record, rows)
+        step = _likelier(run, track, record, rows, led_by)
         if step is None:
             break
         ratio += step[2]
@@ -73,7 +81,11 @@ def on_springs(aiding: Sequence[Aiding]) -> list[Aiding]:
 
 
 def _likelier(
-    run: Callable[[ImuRecord], Track], base: Track, record: ImuRecord, at: int
+    run: Callable[[ImuRecord], Track],
+    base: Track,
+    record: ImuRecord,
+    at: int,
+    led_by: Callable[[ImuRecord, ImuRecord], Track] | None,
 ) -> tuple[int, Track, float] | None:
     """Rows by which the gyros are more likely late than by `at`, the track without that delay, and the ratio; None: no others.
 
@@ -86,7 +98,7 @@ def _likelier(
         if rows not in ratios:
             try:
                 tracks[rows] = run(gyros_later(record, -rows))
-                ratios[rows] = likelihood_ratio(not_of_gyros(base), tracks[rows].residuals)
+                ratios[rows] = likelihood_ratio(not_of_gyros(base), tracks[rows].residuals, one_model=True)
             except DataError:  # the filter broke down: no explanation
                 ratios[rows] = -math.inf
         return ratios[rows]
@@ -101,7 +113,11 @@ def _likelier(
                 break
     tried(_peak(ratios, max(ratios, key=ratios.__getitem__)))  # which may stand out where no rung of the ladder does
     best = max(ratios, key=ratios.__getitem__)
-    return (best, tracks[best], ratios[best]) if ratios[best] > limit("rival") else None
+    ratio = ratios[best]
+    if ratio > limit("rival") and led_by is not None:
+        same = led_by(gyros_later(record, -at), gyros_later(record, -best))
+        ratio = min(ratio, likelihood_ratio(not_of_gyros(same), tracks[best].residuals, one_model=True))
+    return (best, tracks[best], ratio) if ratio > limit("rival") else None
 
 
 def _rejected(track: Track) -> int:

@@ -49,10 +49,10 @@ def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float) -> float:
     """
     names = {source.name for source in aiding}
     sources = [r for r in track.residuals if r.name in SOURCES and r.name in names]
-    seen = [pair for pair in (_pairs(track, r, had) for r in sources) if len(pair[0]) >= FEWEST]
+    seen = [pair for pair in (pairs(r, SOURCES[r.name](track, r.time), had) for r in sources) if len(pair[0]) >= FEWEST]
     if not seen:
         return 0.0
-    likelihood = np.sum([_likelihood(*pair) for pair in seen], axis=0)
+    likelihood = np.sum([likelihoods(*pair, TRIES) for pair in seen], axis=0)
     best = int(np.argmax(likelihood))
     return float(TRIES[best]) if likelihood[best] - likelihood[0] > limit("rival") else 0.0
 
@@ -105,12 +105,11 @@ SOURCES: dict[str, Callable[[Track, Array], Array]] = {
 }
 
 
-def _pairs(track: Track, r: Residuals, had: float) -> tuple[Array, Array, Array]:
-    """Of innovations that follow each other, along the rate of their stamps: square of the difference, variance, square of rates.
+def pairs(r: Residuals, rate: Array, had: float) -> tuple[Array, Array, Array]:
+    """Of innovations that follow each other, along a rate (M, 3): square of the difference, variance, square of rates.
 
-    The variance is without the scatter that the sigmas have already.
+    The variance is without what `had` times the rate has added to the sigmas already.
     """
-    rate = SOURCES[r.name](track, r.time)
     there, some = np.isfinite(r.innovation), r.rows > 0
     e, sigma, rate = (np.where(there, values, 0.0)[some] for values in (r.innovation, r.sigma, rate))
     pairs = rate[1:] + rate[:-1]  # of rows that follow each other alike, or the two say little
@@ -123,12 +122,12 @@ def _pairs(track: Track, r: Residuals, had: float) -> tuple[Array, Array, Array]
     return difference**2, S, squares
 
 
-def _likelihood(squares: Array, variance: Array, rates: Array) -> Array:
+def likelihoods(squares: Array, variance: Array, rates: Array, tries: Array) -> Array:
     """(T,) twice the log-likelihood of differences with each scatter that is tried, the factor of the variance the best, halved."""
-    found = np.full(len(TRIES), -math.inf)
+    found = np.full(len(tries), -math.inf)
     quiet = variance > 0.0
     squares, variance, rates = squares[quiet], variance[quiet], rates[quiet]
     for factor in np.geomspace(0.25, 16.0, 25):
-        v = factor * variance + TRIES[:, None] ** 2 * rates
+        v = factor * variance + tries[:, None] ** 2 * rates
         found = np.maximum(found, -0.5 * np.sum(np.minimum(squares / v, MOST) + np.log(v), axis=1))
     return found

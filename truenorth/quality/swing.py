@@ -1,0 +1,70 @@
+"""An antenna's swing that its receiver does not show: its velocity is a mean over a time, and the swing on an arm is quicker.
+
+A receiver has its velocities from phases over a part of its interval, and filters them. An antenna on an arm l moves by ``w x l``
+besides its vehicle: on a mast of 2 m on a cart by .1 to .2 m/s (RMS over a second), where the gyros show each shake and the
+receiver hardly any. What is predicted of that is noise then, on rough ground alone: rows were rejected, and the filter explained
+the rest by a delay that was twenty of its sigmas off, or by a shorter arm.
+
+A share k of the swing, its RMS over the interval about a row, is added to the sigmas of velocities. It is the likeliest one, by
+differences of innovations as the scatter of stamps (:mod:`truenorth.quality.stamps`), and none where chance explains it. A
+receiver that shows nothing of the swing has a share of 1. One that shows that of another moment has the root of 2, both swings
+count: so nothing is learnt where a delay is given, since one that is wrong would hide in it.
+
+The rule is ours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.quality.stamps import likelihoods, pairs
+from truenorth.quality.whiteness import FEWEST
+from truenorth.records import ImuRecord
+from truenorth.state.limits import limit
+from truenorth.state.track import Track
+from truenorth.strapdown.increments import increments
+
+Array = NDArray[np.float64]
+
+VELOCITIES = "GNSS velocity"
+SMOOTHED = 1.0  # s, over which a receiver takes a mean, or its interval where that is shorter
+SHARES = np.concatenate([[0.0], np.geomspace(0.1, 2.0, 40)])
+
+
+def unseen_swing(track: Track, record: ImuRecord, arm: Array, had: float) -> float:
+    """The share of an antenna's swing that its velocities do not show; 0 where chance explains it.
+
+    Parameters
+    ----------
+    track : Track
+        Of a pass with these velocities.
+    record : ImuRecord
+    arm : (3,) array, m
+        IMU to antenna.
+    had : float
+        The share that is in their sigmas already.
+    """
+    for r in track.residuals:
+        if r.name == VELOCITIES:
+            squares, variance, swings = pairs(r, swing(track, record, arm, r.time), had)
+            if len(squares) >= FEWEST:
+                likelihood = likelihoods(squares, variance, swings, SHARES)
+                best = int(np.argmax(likelihood))
+                return float(SHARES[best]) if likelihood[best] - likelihood[0] > limit("rival") else 0.0
+    return 0.0
+
+
+def swing(track: Track, record: ImuRecord, arm: Array, time: Array) -> Array:
+    """(M, 3) RMS of an antenna's swing on its arm about some times, east, north, up, m/s."""
+    if len(time) < 2 or not arm.any():
+        return np.zeros((len(time), 3))
+    half = 0.5 * min(SMOOTHED, float(np.median(np.diff(np.sort(time)))))
+    moves = np.cross(increments(record)[0] / record.steps[:, None], arm)
+    squares = (moves[:, :, None] * moves[:, None, :]).reshape(-1, 9)
+    sums = np.vstack([np.zeros(12), np.cumsum(np.hstack([moves, squares]), axis=0)])
+    begin, end = (np.searchsorted(record.time, time + side) for side in (-half, half))
+    means = (sums[end] - sums[begin]) / np.maximum(end - begin, 1)[:, None]
+    covariance = means[:, 3:].reshape(-1, 3, 3) - means[:, :3, None] * means[:, None, :3]
+    C = track.C_nb[np.clip(np.searchsorted(track.time, time), 0, len(track.time) - 1)]
+    return np.asarray(np.sqrt(np.maximum(np.einsum("kia,kab,kib->ki", C, covariance, C), 0.0)))
