@@ -7,7 +7,7 @@ takes a drift up, but not its size. The way that heights go with velocities is t
 nothing says which.
 
 Sound receivers have slow errors of height (multipath, atmosphere), which look like that. So a drift refuses no log: what it moves
-the answer by is in sigma.
+the answer by is in sigma, and where one sound log in a hundred shows as much by chance, too.
 
 Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
 systems", IEEE Trans. Autom. Control 21 (1976); signatures by passes of the filter are ours.
@@ -63,7 +63,7 @@ def height_evidence(
             ratio, size = likeliest(seen)
             found = max(found, (ratio + before, float(size[0]) if ratio > 0.0 else 0.0))
         ratio, rate = found
-        if ratio <= limit("rival"):
+        if ratio <= limit("height drift"):
             return []
         effect = moved(first, run(_level(receiver, rate)))
     except DataError:  # the filter broke down: no explanation

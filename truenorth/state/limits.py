@@ -77,6 +77,11 @@ LIMITS: dict[str, Limit] = {
         "1",
         "the same, of gyros reversed about both level axes: sound drives have -120 and less, reversed ones 19 and more",
     ),
+    "height drift": Limit(
+        6.6,
+        "twice the logarithm of a likelihood ratio",
+        "that one sound log in a hundred exceeds; what it moves is in sigma",
+    ),
     "rival": Limit(
         10.0,
         "1",
