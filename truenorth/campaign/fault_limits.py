@@ -59,6 +59,8 @@ BY_SIGN = (
     "which are not known"
 )
 LEAST_RATIO = 25.0
+ON_THE_MOVE = ("odometer", "gnss", "transfer", "attitude", "navigate")
+AXES = ("gyro axes turned", "gyro askew")  # a vehicle that turns about its vertical alone hardly shows them
 # Faults that act as motion does: on the move only the aiding measurements speak of them.
 LIKE_MOTION = (
     *(f"{sensor} {what}" for sensor in ("gyro", "accel") for what in ("bias step", "bias ramp", "warming up", "scale")),
@@ -71,11 +73,7 @@ LIKE_MOTION = (
 # A turn that lags is another heading while it lasts; straight and level flight shows a master by velocity no heading.
 LATE = ("late gyros", "gyros late by a filter")
 SIGNS = ("gyro sign",)
-LIKE_HEADING = (
-    "gyro scale",
-    "gyro axes turned",
-    "gyro askew",
-)  # that act on a base at rest as another heading does, to first order
+LIKE_HEADING = ("gyro scale", *AXES)  # that act on a base at rest as another heading does, to first order
 
 
 class Unseen(NamedTuple):
@@ -109,7 +107,8 @@ def unseen(procedure: str, fault: str, size: str, ratio: float | None = None) ->
     measured = ratio is not None and ratio < LEAST_RATIO
     if measured and procedure in REST and fault in LIKE_HEADING:
         return f"what gyros at rest see prefers the sound log by {ratio:.1f} only"
-    if measured and procedure not in REST and fault in LIKE_MOTION:
+    seldom = fault in LIKE_MOTION or (procedure in ON_THE_MOVE and fault in AXES)
+    if measured and procedure not in REST and seldom:
         return f"the measurements prefer the true sensors by {ratio:.1f} only"
     if measured and procedure == "transfer" and fault in LATE:
         return f"the master's velocities prefer gyros of one moment by {ratio:.1f} only"

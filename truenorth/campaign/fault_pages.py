@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from truenorth.campaign.fault_limits import (
+    AXES,
     BY_LATENCY,
     BY_LIKELIHOOD,
     BY_MEANS,
@@ -18,6 +19,7 @@ from truenorth.campaign.fault_limits import (
     LATE,
     LIKE_HEADING,
     LIKE_MOTION,
+    ON_THE_MOVE,
     REST,
     SIGNS,
     UNSEEN,
@@ -141,7 +143,7 @@ def _unseen() -> list[str]:
     lines.append(f"| {', '.join(biases)} | swaying | {BY_STAYING} |")
     lines.append(f"| {', '.join(LATE)} | transfer | {BY_LATENCY} |")
     lines.append(f"| {', '.join(SIGNS)} | transfer | {BY_SIGN} |")
-    return [*lines, f"| {', '.join(LIKE_MOTION)} | odometer, gnss, transfer, attitude, navigate | {BY_LIKELIHOOD} |"]
+    return [*lines, f"| {', '.join((*LIKE_MOTION, *AXES))} | {', '.join(ON_THE_MOVE)} | {BY_LIKELIHOOD} |"]
 
 
 def _sizes(size: str) -> str:
