@@ -7,12 +7,12 @@ that the base does of its own, and behind its arm, which swings in the same way.
 the arm among its states.
 
 First it is asked what each entry of ``M`` does to its measurements: the squares that this explains are a chi-square of nine degrees
-of freedom where the gyros are as their specification says (11 on the average of sound logs, 18 at the most of eight). Where they
-are more, the log is aligned with ``M`` among the states, as large as it likes; the gyros are put right by what that finds, and
-aligned anew. A push of waves in step with the tilt makes such a matrix seem, too: :mod:`~truenorth.alignment.put_right`. Of 40
-gyros turned by .3 to 3 deg, or scaled or askew by .3 to 5 %, a push explained .1 to 4 % of what their matrix does, of one more
-12 %; of 32 sound ships, buoys and rafts 20 % and more. In between, and where late gyros explain as much, what the matrix does is
-in sigma.
+of freedom where the gyros are as their specification says (19 on the average of 24 sound sways, 4 of indexers). Where they are
+more, the likeliest ``M`` is searched: the log is aligned with it among the states, as large as it likes, or put right by what the
+innovations show of it, and aligned anew, the motion fitted anew. A push of waves in step with the tilt makes such a matrix seem,
+too: :mod:`~truenorth.alignment.put_right`. Of 40 gyros turned by .3 to 3 deg, or scaled or askew by .3 to 5 %, a push explained .1
+to 4 % of what their matrix does, of one more 12 %; of 32 sound ships, buoys and rafts 20 % and more. In between, and where late
+gyros explain as much, what the matrix does is in sigma.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _response(fine: SwayAlignment, size: float = np.inf) -> tuple[Array, Array]:
     log, base = fine.about, fine.estimator.base
     bigger = with_matrices(base, log.right_record, log.integrals, log.C_n0_i, log.position.lat)
     made, _, white = through_filter(fine, response(bigger)[0][:, :, base.states : base.states + 9])
-    P = np.linalg.pinv(made.T @ made + np.eye(9) / size**2, hermitian=True)
+    P = np.asarray(np.linalg.pinv(made.T @ made + np.eye(9) / size**2, hermitian=True), dtype=np.float64)
     return P @ (made.T @ white), P
 
 
