@@ -28,11 +28,20 @@ def turn_found(answer):
 
 
 @pytest.mark.parametrize(
-    ("run", "degrees"),
-    some([(2, [0.1, 0.1, -0.35])], [(1, [0.0, 0.0, 2.0]), (3, [-0.7, 0.25, -0.3]), (4, [1.5, -0.5, -1.5])]),
+    ("seed", "run", "degrees"),
+    some(
+        [(SEED, 2, [0.1, 0.1, -0.35])],
+        [
+            (SEED, 1, [0.0, 0.0, 2.0]),
+            (SEED, 3, [-0.7, 0.25, -0.3]),
+            (SEED, 4, [1.5, -0.5, -1.5]),
+            (52, 7, [0.0, -0.06, -0.6]),
+        ],
+    ),
 )
-def test_a_turn_on_a_sway_is_found_and_refused(run, degrees):
-    inputs, _ = BENCHES["swaying"].draw(SEED, run)
+def test_a_turn_on_a_sway_is_found_and_refused(seed, run, degrees):
+    """Of seed 52 a fitted motion takes the turn up: with an open matrix the log is likelier by 75, at the truth by 1600."""
+    inputs, _ = BENCHES["swaying"].draw(seed, run)
     answer = BENCHES["swaying"].align(inputs | {"record": turned(inputs["record"], degrees)})
     found = turn_found(answer)
     assert abs(found["turn"] - np.radians(np.linalg.norm(degrees))) < 4.0 * found["sigma"] < np.radians(0.7)
@@ -40,12 +49,18 @@ def test_a_turn_on_a_sway_is_found_and_refused(run, degrees):
 
 
 @pytest.mark.parametrize(
-    ("run", "row", "column", "size"),
-    some([(4, 0, 1, -0.0078)], [(1, 0, 0, -0.015), (6, 1, 1, -0.0071), (7, 0, 0, 0.0273)]),
+    ("seed", "run", "row", "column", "size"),
+    some(
+        [(60, 4, 0, 1, -0.0078), (52, 1, 2, 1, -0.05)],
+        [(60, 1, 0, 0, -0.015), (60, 6, 1, 1, -0.0071), (60, 7, 0, 0, 0.0273), (52, 5, 2, 1, 0.03)],
+    ),
 )
-def test_one_gyro_that_is_askew_or_scaled_is_found_and_refused(run, row, column, size):
-    """Behind an arm of metres, which swings as a scale factor does; up to 28 sigmas of heading, `aligned`."""
-    inputs, _ = BENCHES["swaying"].draw(60, run)
+def test_one_gyro_that_is_askew_or_scaled_is_found_and_refused(seed, run, row, column, size):
+    """Behind an arm of metres, which swings as a scale factor does; up to 28 sigmas of heading, `aligned`.
+
+    Of seed 52 the gyro about the vertical sees a part of the roll: no slow attitude shows that.
+    """
+    inputs, _ = BENCHES["swaying"].draw(seed, run)
     gyro = inputs["record"].gyro.copy()
     gyro[:, row] += size * inputs["record"].gyro[:, column]
     answer = BENCHES["swaying"].align(inputs | {"record": replace(inputs["record"], gyro=gyro)})

@@ -7,12 +7,12 @@ that the base does of its own, and behind its arm, which swings in the same way.
 the arm among its states.
 
 First it is asked what each entry of ``M`` does to its measurements: the squares that this explains are a chi-square of nine degrees
-of freedom where the gyros are as their specification says (11 on the average of sound logs, 18 at the most of eight). Where they
-are more, the log is aligned with ``M`` among the states, as large as it likes; the gyros are put right by what that finds, and
-aligned anew. A push of waves in step with the tilt makes such a matrix seem, too: :mod:`~truenorth.alignment.put_right`. Of 40
-gyros turned by .3 to 3 deg, or scaled or askew by .3 to 5 %, a push explained .1 to 4 % of what their matrix does, of one more
-12 %; of 32 sound ships, buoys and rafts 20 % and more. In between, and where late gyros explain as much, what the matrix does is
-in sigma.
+of freedom where the gyros are as their specification says (19 on the average of 24 sound sways, 4 of indexers). Where they are
+more, the likeliest ``M`` is searched: the log is aligned with it among the states, as large as it likes, or put right by what the
+innovations show of it, and aligned anew, the motion fitted anew. A push of waves in step with the tilt makes such a matrix seem,
+too: :mod:`~truenorth.alignment.put_right`. Of 40 gyros turned by .3 to 3 deg, or scaled or askew by .3 to 5 %, a push explained .1
+to 4 % of what their matrix does, of one more 12 %; of 32 sound ships, buoys and rafts 20 % and more. In between, and where late
+gyros explain as much, what the matrix does is in sigma.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.bias_step import matrix_signatures
-from truenorth.alignment.matched import innovations_of
-from truenorth.alignment.put_right import Anew, hardly_sampled, in_step, likelihood
+from truenorth.alignment.put_right import Anew, hardly_sampled, in_step, likelihood, through_filter
 from truenorth.alignment.swaying import SwayAlignment
+from truenorth.alignment.windowed import response
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.attitude import misalignment
 from truenorth.core.errors import DataError
+from truenorth.errors.matrices import with_matrices
 from truenorth.errors.staying import PHI
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 
 ROUNDS = 5  # of matrices left open, the gyros put right by the one before: what yaw alone shows comes last
 OPEN = (0.01, 0.05)  # of a turn, one sigma of each entry where the matrix is left open
+LARGEST = 0.2  # entry of a step
 ONE = np.eye(3, dtype=np.bool_)
 LATE = ("response.gyros_late", "response.gyros_early")
 
@@ -75,9 +76,7 @@ def gyro_matrix_evidence(
     if hardly_sampled(record) or _explained(fine, imu) < chi_square_limit(limit("matrix"), 9):
         return []
     try:
-        again = anew(record)  # a motion that is fitted anew may be likelier by itself
-        as_given = max(likelihood(fine), likelihood(again))
-        found = _put_right(record, imu, anew, again, as_given)
+        found, as_given = _put_right(record, imu, anew, fine)
     except DataError:  # the filter broke down: with so open a matrix the log says nothing
         return []
     gained = likelihood(found.fine) - as_given
@@ -96,58 +95,91 @@ def gyro_matrix_evidence(
 
 def _explained(fine: SwayAlignment, imu: ImuSpec) -> float:
     """Squares of the innovations that a matrix of the gyros explains, by what is known of it and by their noise."""
-    seen = matrix_signatures(fine, replace(imu, gyro_scale_factor=1.0, gyro_misalignment=1.0))
-    if seen is None:
-        return 0.0
-    white = innovations_of(fine, np.ascontiguousarray(seen[:, :, :9])).white
-    response = white[..., 1:].reshape(-1, 9)
-    P = np.linalg.pinv(response.T @ response, hermitian=True)
-    M = P @ (response.T @ white[..., 0].ravel())
+    M, P = _response(fine)
     known = np.where(ONE, imu.gyro_scale_factor, np.hypot(imu.gyro_misalignment, imu.accel_misalignment)).ravel()
     return float(M @ np.linalg.pinv(P + np.diag(known**2), hermitian=True) @ M)
 
 
-def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, again: SwayAlignment, as_given: float) -> _Found:
-    """The likeliest matrix of the gyros: of one that is left a little open and one that is wide open, round after round.
+def _response(fine: SwayAlignment, size: float = np.inf) -> tuple[Array, Array]:
+    """The gyros' matrix (9,) that the innovations of a filter show, its motion held, and its covariance (9, 9).
 
-    A motion of the base takes a part of a matrix up, and the more so the farther that one may go: wide open it may come to rest
-    where the log is less likely than as given. Where a push explains more than the first matrix does, it is none.
+    By the attitude as it sways: by its slow part, by which biases act, a gyro about the vertical that sees a part of the roll shows
+    nowhere.
+
+    Parameters
+    ----------
+    size : float
+        One sigma of each entry.
     """
-    best = _Found(np.zeros((3, 3)), np.zeros((3, 3)), again, np.inf)
-    for _ in range(ROUNDS):
-        put = np.asarray(np.linalg.inv(np.eye(3) + best.M), dtype=np.float64)
-        right = replace(record, gyro=record.gyro @ put.T)
-        better = best
-        for size in OPEN:
-            found = _corrected(record, put, *_left_open(anew(right, _opened(imu, size))), anew)
-            better = max(better, found, key=lambda item: likelihood(item.fine))
-            if better.pushed > likelihood(better.fine) - as_given:
-                return better
+    log, base = fine.about, fine.estimator.base
+    bigger = with_matrices(base, log.right_record, log.integrals, log.C_n0_i, log.position.lat)
+    made, _, white = through_filter(fine, response(bigger)[0][:, :, base.states : base.states + 9])
+    P = np.asarray(np.linalg.pinv(made.T @ made + np.eye(9) / size**2, hermitian=True), dtype=np.float64)
+    return P @ (made.T @ white), P
+
+
+def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, fine: SwayAlignment) -> tuple[_Found, float]:
+    """The likeliest matrix of the gyros, and the likelihood without any.
+
+    Each round tries, from the best so far, a matrix that is left a little open and one that is wide open, and a step to what the
+    filter's innovations show. A motion of the base takes a part of a matrix up: left open it may come to rest where the log is less
+    likely than as given; the steps go on with a motion that is fitted to each, and are too short. Where a push explains more
+    than the first matrices do, it is none.
+    """
+    best, as_given = _Found(np.zeros((3, 3)), np.zeros((3, 3)), fine, np.inf), likelihood(fine)
+    for turn in range(ROUNDS):
+        found = _left_open(record, best, _opened(imu, OPEN[0]), anew), _stepped(record, best, anew)
+        better = max(best, *found, key=_likelihood)
+        if turn == 0 and better.pushed <= _likelihood(better) - as_given:
+            as_given = max(as_given, likelihood(anew(record)))  # a motion that is fitted anew may be likelier by itself
+        if better.pushed > _likelihood(better) - as_given:
+            break
+        better = max(better, _left_open(record, best, _opened(imu, OPEN[1]), anew), key=_likelihood)
         if better is best:
             break
         best = better
-        if best.pushed <= limit("pushed in step") * (likelihood(best.fine) - as_given):
+        if best.pushed <= limit("pushed in step") * (_likelihood(best) - as_given):
             break
-    return best
+    return best, as_given
 
 
 def _opened(imu: ImuSpec, size: float) -> ImuSpec:
     return replace(imu, gyro_scale_factor=size, gyro_misalignment=size)
 
 
-def _corrected(record: ImuRecord, put: Array, M: Array, sigma: Array, anew: Anew) -> _Found:
-    """The log aligned with its gyros put right by `put` and a matrix that was found after it."""
-    put = np.linalg.inv(np.eye(3) + M) @ put
-    fine = anew(replace(record, gyro=record.gyro @ put.T))
-    return _Found(np.linalg.inv(put) - np.eye(3), sigma, fine, in_step(fine))
-
-
-def _left_open(found: SwayAlignment) -> tuple[Array, Array]:
-    """The gyros' matrix (3, 3) that an alignment finds which leaves it open, taken off and left at the end; and its one-sigmas."""
+def _left_open(record: ImuRecord, best: _Found, wide: ImuSpec, anew: Anew) -> _Found:
+    """With the matrix that an alignment finds which leaves it open, taken off and left at the end."""
+    found = anew(_right(record, best.M), wide)
     at = found.about.prior.groups["matrices"]
     gyros = slice(at.start, at.start + 9)
     M = found.about.taken[gyros] + found.estimates.x[-1][gyros]
-    return M.reshape(3, 3), np.sqrt(np.diag(found.estimates.P[-1])[gyros]).reshape(3, 3)
+    return _corrected(record, best, M, np.diag(found.estimates.P[-1])[gyros], anew)
+
+
+def _stepped(record: ImuRecord, best: _Found, anew: Anew) -> _Found:
+    """With the matrix that the innovations of the best so far show, or a multiple of it, as long as the log becomes likelier."""
+    M, P = _response(best.fine, OPEN[-1])
+    found, before = _corrected(record, best, M, np.diag(P), anew), best
+    while _likelihood(found) > _likelihood(before) and 2.0 * np.abs(M).max() <= LARGEST:
+        M, before = 2.0 * M, found
+        found = _corrected(record, best, M, np.diag(P), anew)
+    return max(before, found, key=_likelihood)
+
+
+def _corrected(record: ImuRecord, best: _Found, M: Array, variance: Array, anew: Anew) -> _Found:
+    """The log aligned with its gyros put right by the best so far and by a matrix (9,) that was found after it."""
+    total = (np.eye(3) + best.M) @ (np.eye(3) + M.reshape(3, 3)) - np.eye(3)
+    fine = anew(_right(record, total))
+    return _Found(total, np.sqrt(variance).reshape(3, 3), fine, in_step(fine))
+
+
+def _right(record: ImuRecord, M: Array) -> ImuRecord:
+    """Of gyros that see ``(I + M) w``."""
+    return replace(record, gyro=record.gyro @ np.linalg.inv(np.eye(3) + M).T)
+
+
+def _likelihood(found: _Found) -> float:
+    return likelihood(found.fine)
 
 
 def _named(M: Array, sigma: Array) -> tuple[str, dict[str, Figure]]:

@@ -31,7 +31,6 @@ from truenorth.coarse import oba
 from truenorth.coarse.uncertainty import detrended, own_motion
 from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
-from truenorth.errors.matrices import matrices_of, without_errors
 from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
@@ -292,9 +291,7 @@ def _filtered(log: StayingLog, estimator: _MotionFilter, misfit: Callable[[Posit
 
 def _heave(log: StayingLog) -> Heave:
     """Of a log, with the errors of its sensors that were found taken off."""
-    matrices = log.prior.groups.get("matrices")
-    off = (np.zeros((3, 3)),) * 2 if matrices is None else matrices_of(log.taken[matrices])
-    return Heave(without_errors(log.record, log.bias, *off), log.C_n0_i, log.position, log.noise.accel_random_walk)
+    return Heave(log.right_record(), log.C_n0_i, log.position, log.noise.accel_random_walk)
 
 
 def best_bias(fine: SwayAlignment) -> float:

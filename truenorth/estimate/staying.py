@@ -205,7 +205,7 @@ class StayingLog:
             self.noise, slow, self.integrals, self.C_n0_i, self.position, P0[:STATES, :STATES], self.form
         )
         if "matrices" in groups:
-            system = with_matrices(system, self._without_errors, self.integrals, self.C_n0_i, lat)
+            system = with_matrices(system, self.right_record, self.integrals, self.C_n0_i, lat)
             self._turns = system.Phi[:, PHI, groups["matrices"]]
         if "arm" in groups:
             rows = arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)
@@ -245,12 +245,15 @@ class StayingLog:
             J[:, matrices] = -np.sum(self._turns, axis=0)
         return J
 
-    def _without_errors(self) -> ImuRecord:
-        return without_errors(self.record, self.bias, *matrices_of(self.taken[self.prior.groups["matrices"]]))
+    def right_record(self) -> ImuRecord:
+        """The record without the errors of its sensors that are taken off, as increments."""
+        matrices = self.prior.groups.get("matrices")
+        off = (np.zeros((3, 3)),) * 2 if matrices is None else matrices_of(self.taken[matrices])
+        return without_errors(self.record, self.bias, *off)
 
     def _integrated(self) -> InertialIntegrals:
         if "matrices" in self.prior.groups:
-            return integrate(self._without_errors(), self.interval, rows_at=self.rows)
+            return integrate(self.right_record(), self.interval, rows_at=self.rows)
         return integrate(self.record, self.interval, self.bias[:3], self.bias[3:], self.rows)
 
 
