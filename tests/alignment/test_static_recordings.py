@@ -1,5 +1,7 @@
 """System 4 on real recordings: every method on one still log, and a specification from the Allan deviation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,3 +81,13 @@ def test_a_specification_from_the_allan_deviation_refuses_heading_with_figures()
     assert f"gyro bias can be {bias} deg/h (specification 'adis16405 by Allan')" in answer.reasons[0]
     assert "needs 0.8" in answer.reasons[0]  # w_ie cos(51 deg) tan(5 deg) = .83 deg/h
     assert np.all(np.isfinite(answer.euler_sigma[1:]))
+
+
+@pytest.mark.parametrize("order", [(0, 2, 1), (1, 2, 0), (2, 0, 1), (2, 1, 0)])
+def test_accelerometers_of_another_order_under_good_gyros(order):
+    """A parked vehicle that people shake: the rate about the wrong vertical is as steady as no base turns."""
+    record, position = recordings.rlg_vehicle_xian()
+    window = record.between(record.time[0] + 300.0, record.time[0] + 600.0)
+    answer = align(replace(window, accel=window.accel[:, list(order)]), position, "navigation")
+    assert answer.status == "inconsistent"
+    assert any(item.key == "rate.misses" for item in answer.evidence)
