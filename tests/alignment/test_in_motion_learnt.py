@@ -10,9 +10,9 @@ from benchmarks.honesty.harness import simulated
 from truenorth.aiding.sensors import from_gnss
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.alignment.in_motion_learnt import changed, noise_factors
 from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.estimate.poorer import poorer
+from truenorth.quality.aid_noise import changed, noise_factors
 from truenorth.records.specs import imu_spec
 from truenorth.state.layout import Layout
 from truenorth.state.track import Residuals, Track

@@ -6,9 +6,10 @@ import pytest
 from tests import recordings
 from truenorth.aiding.aids import Gnss, Odometer
 from truenorth.alignment import align
-from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.attitude import dcm_from_euler, misalignment
 from truenorth.navigation import Mounting, Start, navigate
 from truenorth.records import GnssRecord
+from truenorth.state.layout import PHI
 
 
 @pytest.mark.slow
@@ -108,6 +109,21 @@ def test_car_with_gnss_and_odometer(car):
     heading = np.arctan2(forward[fast, 0], forward[fast, 1])
     off = np.degrees((heading - course + np.pi) % (2 * np.pi) - np.pi)
     assert np.median(np.abs(off)) < 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("aligned", "end"), [(75.0, 140.0), (100.0, 140.0)])
+def test_car_of_whose_wheel_nothing_is_said(aligned, end):
+    """Ten times as noisy on the move as wheels are: half of its rows were rejected, and the car 3 km off. As by GNSS alone."""
+    imu, odometer, gnss = recordings.car_mems_odo_gnss()
+    both = [Odometer(odometer), Gnss(gnss)]
+    start = align(imu.between(None, aligned), imu="consumer", aid=both)
+    result = navigate(imu.between(None, end), start, aid=both, imu="consumer")
+    assert result.status == "navigated", result.reasons
+    assert any(item.key == "noise.estimated" for item in result.evidence)
+    by_gnss = navigate(imu.between(None, end), start, aid=[Gnss(gnss)], imu="consumer")
+    off = misalignment(result.C_nb[-1], by_gnss.C_nb[-1])
+    assert np.all(np.abs(off) < 3.0 * np.hypot(result.track.sigma[-1, PHI], by_gnss.track.sigma[-1, PHI]))
 
 
 @pytest.mark.slow

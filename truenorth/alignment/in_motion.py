@@ -20,7 +20,7 @@ from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_axes import half_turn_evidence
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
-from truenorth.alignment.in_motion_learnt import learnt_evidence, noise_factors
+from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
 from truenorth.alignment.in_motion_moments import two_moments
 from truenorth.alignment.in_motion_open import open_track
@@ -45,6 +45,7 @@ from truenorth.estimate.poorer import ALONE, poorer_evidence, poorer_rivals, poo
 from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
+from truenorth.quality.aid_noise import noise_factors
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.slow_aids import FIXES, SPEEDS

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.aids import ANTENNA, LATENCY_SIGMA, WHEEL
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity, states_of
 from truenorth.aiding.source import Aiding
-from truenorth.alignment.in_motion_learnt import changed, differs, louder, noise_factors
+from truenorth.alignment.in_motion_learnt import differs
 from truenorth.alignment.in_motion_start import Guess, coarse_guess, start_at
 from truenorth.core.earth import radii
 from truenorth.core.errors import AlignmentError, UsageError
@@ -29,6 +29,7 @@ from truenorth.estimate.sensor_delay import on_springs
 from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_rest
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.absolute import known_as_fixes
+from truenorth.quality.aid_noise import changed, louder, noise_factors
 from truenorth.quality.regimes import motion_summary
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import (

@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
 from truenorth.errors.model import InsModel
@@ -16,14 +19,19 @@ from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.second_look import SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size
+from truenorth.quality.aid_noise import changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
+Array = NDArray[np.float64]
+
 COARSE = 1.0  # s, between predictions of a filter that looks for the receiver's errors
 PART = 900.0  # s of a log, that show them: some ten times as long as they last
+WHEEL, LOUD = "odometer", 3.0  # times its sigma, from which a wheel's noise is learnt
+NOISE_PASSES = 4
 MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 
 
@@ -39,10 +47,12 @@ class Plan:
     interval: float
     every: int
     slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
+    factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
 
     def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
         """Measurements of all aids."""
-        return with_slow([source for a in given.values() for source in a.sources(self.altitude)], self.slow)
+        said = [source for a in given.values() for source in a.sources(self.altitude)]
+        return louder(with_slow(said, self.slow), self.factors)
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
@@ -68,6 +78,8 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     said: list[Evidence] = []
     asked = given
     track = plan.run(plan.sources(given), smooth=smooth)
+    plan, track = _as_noisy(plan, given, track, smooth)
+    said += noise_notes(plan.factors)
     later = delayed(plan, given, track)
     if later is not given:
         given = later
@@ -91,6 +103,24 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         if given.get(key) is not asked.get(key):
             track = counted_from(track, name, given[key].mounting.latency - asked[key].mounting.latency)
     return plan, given, track, said
+
+
+def _as_noisy(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
+    """The plan with a wheel as noisy as its innovations show, and its track; the same ones where it is as noisy as it says.
+
+    The first pass counts rows far out, or its gate rejects half of a noisy wheel's; the next ones see what is left. Receivers say
+    how noisy they are, and what is slow in that is looked at by itself.
+    """
+    for number in range(NOISE_PASSES):
+        asked = [source for source in plan.sources(given) if source.name == WHEEL]
+        wheel = noise_factors(track, asked, plan.factors, tails=number == 0)
+        if number == 0 and all(float(factor.max()) <= LOUD for factor in wheel.values()):
+            return plan, track
+        if not changed(plan.factors, wheel):
+            break
+        plan = replace(plan, factors=wheel)
+        track = plan.run(plan.sources(given), smooth=smooth)
+    return plan, track
 
 
 def _fitted(plan: Plan, given: dict[str, Any], receiver: Gnss) -> tuple[Plan, list[Evidence]]:

@@ -1,0 +1,119 @@
+"""How noisy aids are, by the innovations of a pass over the log.
+
+Innovations of a right model are white. Errors of the model are slow against the rows of a sensor, noise of the sensor is not: half
+the mean square of the *difference* of innovations that follow each other is the part that is white. Where it is ``q`` times as
+large as the variances ``S = H P H' + R`` say, R is ``1 + (q - 1) S / R`` times too small, and the next pass takes it as large. What
+is slow is left to the verdict (:mod:`truenorth.quality.innovations`).
+
+Source: R. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Autom. Control 15 (1970).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.source import Aiding
+from truenorth.quality.whiteness import FEWEST
+from truenorth.state.evidence import Evidence, note
+from truenorth.state.limits import limit
+from truenorth.state.track import Residuals, Track
+
+Array = NDArray[np.float64]
+
+LEAST_FACTOR = 1.15  # of sigma: less is what a usual value is worth
+# Chi-square with one degree of freedom: half of all are smaller than the first, four fifths than the second. Noise with long tails
+# has the larger scale by the second; a sixth of the rows may be outliers.
+QUANTILES = {0.5: 0.4549, 0.8: 1.6424}
+SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
+MOVES = 0.2  # m/s: a speed below it is standing
+
+
+def noise_factors(
+    track: Track, aiding: Sequence[Aiding], before: Mapping[str, Array], *, tails: bool = False
+) -> dict[str, Array]:
+    """By how much the noise of each source is larger than it says, (3,) by component; those that say enough are left out.
+
+    Parameters
+    ----------
+    track : Track
+        Of a pass with these sources.
+    aiding : sequence of Aiding
+        Those that are asked about.
+    before : mapping
+        Factors that are in their sigmas already.
+    tails : bool
+        Whether rows far out count, too, as they do in a pass that has no gate.
+    """
+    sources = {source.name: source for source in aiding if source.does == "measurement"}
+    found = {}
+    for residuals in track.residuals:
+        if residuals.name not in sources:
+            continue
+        had = before.get(residuals.name, np.ones(3))
+        source = sources[residuals.name]
+        whole, moving = (
+            _factors(part, source, 1.0 / had, tails) for part in (residuals, _on_the_move(residuals, track))
+        )
+        factor = had * np.maximum(whole, moving)
+        if factor.max() > LEAST_FACTOR:
+            found[residuals.name] = factor
+    return found
+
+
+def _scale_of(squares: Array) -> float:
+    """The larger scale of squares by two of their quantiles."""
+    return max(float(np.quantile(squares, share)) / usual for share, usual in QUANTILES.items())
+
+
+def _on_the_move(residuals: Residuals, track: Track) -> Residuals:
+    """Those of a vehicle that moves: a wheel that stands is exact, and says nothing of its noise."""
+    speed = np.linalg.norm(track.v_n, axis=1)
+    moves = np.interp(residuals.stamp, track.time, speed) > MOVES
+    return replace(
+        residuals,
+        innovation=residuals.innovation[moves],
+        sigma=residuals.sigma[moves],
+        stamp=residuals.stamp[moves],
+    )
+
+
+def _factors(residuals: Residuals, source: Aiding, least: Array, tails: bool) -> Array:
+    """(3,) by how much sigma is too small by the white part of the innovations; `least` where they are smaller."""
+    order = np.argsort(source.time, kind="stable")
+    row = order[np.clip(np.searchsorted(source.time[order], residuals.stamp), 0, len(order) - 1)]
+    e, S, R = residuals.innovation, residuals.sigma**2, source.sigma[row] ** 2
+    found = np.ones(3)
+    for axis in range(3):
+        difference = np.diff(e[:, axis]) ** 2 / (S[1:, axis] + S[:-1, axis])
+        there = np.isfinite(difference)
+        if int(there.sum()) < FEWEST:
+            continue
+        q = float(np.mean(difference[there])) if tails else _scale_of(difference[there])
+        if abs(q - 1.0) < limit("chance") * SPREAD / math.sqrt(there.sum()):
+            continue
+        known = np.isfinite(e[:, axis]) & (R[:, axis] > 0.0)
+        share = float(np.median(S[known, axis] / R[known, axis])) if known.any() else 0.0
+        found[axis] = math.sqrt(max(1.0 + (q - 1.0) * share, least[axis] ** 2))
+    return found
+
+
+def louder(aiding: Sequence[Aiding], factors: Mapping[str, Array]) -> list[Aiding]:
+    """The same sources with sigmas so many times as large."""
+    return [replace(s, sigma=s.sigma * factors[s.name]) if s.name in factors else s for s in aiding]
+
+
+def changed(before: Mapping[str, Array], after: Mapping[str, Array]) -> bool:
+    """Whether factors have changed by what matters."""
+    one = np.ones(3)
+    names = before.keys() | after.keys()
+    return any(np.abs(np.log(after.get(n, one) / before.get(n, one))).max() > math.log(LEAST_FACTOR) for n in names)
+
+
+def noise_notes(factors: Mapping[str, Array]) -> list[Evidence]:
+    """How noisy aids were found to be, for the reader: it is in sigma already."""
+    return [note("noise.estimated", name=name, factor=float(factor.max())) for name, factor in factors.items()]
