@@ -280,7 +280,7 @@ def test_a_latitude_that_nobody_gives_is_found(runs):
         sigma = answer.moving.track.sigma[-1, DP][1] / METRES_PER_RADIAN
         assert abs(off) < 3.3 * sigma < math.radians(0.2)
         shown = rf"the latitude was not given: found from the log, {math.degrees(off + lat):.2f} deg, to 0\.0\d+ deg"
-        assert re.match(shown, answer.reasons[-1])
+        assert any(re.match(shown, reason) for reason in answer.reasons)
         assert abs(error(answer, sim)[2] - error(given, sim)[2]) < 0.5
         assert answer.phi_covariance[2, 2] > given.phi_covariance[2, 2]
 
