@@ -51,6 +51,8 @@ def led_at_rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
         return []
     begin = float(longest[0]) - 0.5
     inside = np.flatnonzero((track.time > begin) & (track.time < longest[-1] + 0.5))
+    if not len(inside):
+        return []
     end = int(inside[-1])
     rest = _as_at_rest(task, begin, float(track.time[end]))
     if rest is None:
@@ -59,7 +61,7 @@ def led_at_rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
     horizontal = EARTH_RATE * math.cos(lat)
     heading = float(euler_from_dcm(C)[0])
     off = abs(math.remainder(heading - rest.heading, 2.0 * math.pi))
-    doubt = max(item.effect.heading for item in rest.evidence)
+    doubt = max((item.effect.heading for item in rest.evidence), default=0.0)
     sigma = math.hypot(azimuth_sigmas(rest)[0], doubt, math.sqrt(fifteen(track)[end, PHI, PHI][2, 2]))
     off -= abs(float(np.mean(track.v_n[inside, 1]))) / (float(radii(lat)[0]) * horizontal)
     turns = 2.0 * horizontal * math.sin(0.5 * max(off, 0.0))  # between the two headings of the earth's rate
