@@ -74,6 +74,16 @@ def test_noise_with_long_tails(tails):
     assert tails or np.all(found["log"] < 2.5)
 
 
+def test_a_factor_that_outliers_made_is_unlearnt():
+    """A hundred rows that a factor of 500 has made far too quiet: by chance alone q is between none and several."""
+    rng = np.random.default_rng(SEED)
+    quiet = rng.standard_normal((len(T), 3)) / 500.0
+    quiet[100:] = np.nan
+    source = Aiding("log", "velocity", T, np.zeros((len(T), 3)), 500.0 * np.ones((len(T), 3)))
+    sigma = 500.0 * np.ones((len(T), 3))
+    assert noise_factors(track_of(500.0 * quiet, sigma), [source], {"log": 500.0 * np.ones(3)}) == {}
+
+
 def car(name, run=0):
     case = next(case for case in moving.CASES if case.name.startswith(name))
     return simulated(case.scenario(np.random.default_rng([SEED, run])), SEED, run)

@@ -187,7 +187,6 @@ def _aligned(
         why = "asked for"
     found, spread = _begun(task, method, tell)
     louder = noise_factors(found.track, task.aiding(gated=False), task.factors, tails=True)
-    pass
     if any(float(factor.max()) > LOUD for factor in louder.values()):  # what it found was made of noise
         task = replace(task, factors=louder)
         found, spread = _begun(task, method, tell)

@@ -16,6 +16,7 @@ from truenorth.estimate.latency import SHOWN_DELAY, counted_from, delay_of
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
+from truenorth.quality.swing import VELOCITIES
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.state.evidence import Effect, Evidence, Kind
 from truenorth.state.limits import limit, may_be_chance
@@ -92,30 +93,35 @@ def _of_open_clocks(task: MovingTask, guess: Guess, track: Track, first: Guess, 
     open_ = replace(task, antenna=_opened(task.antenna), wheel=_opened(task.wheel))
     late = open_.run(guess, gated=gated)
     ratio = likelihood_ratio(track.residuals, late.residuals)
-    if not task.factors and not task.scatter:
-        return _Opened(open_, guess, late, ratio)
+    usual = _Opened(open_, guess, late, ratio)
+    if not (task.factors or task.scatter or task.unseen):
+        return usual
     anew = replace(open_, factors={}, scatter=0.0, unseen=0.0, scattered={})
-    found = begun(anew, first, anew.run(first, gated=False))
-    for _ in range(MORE_PASSES):
-        anew, much = anew.learnt(found.track)
-        found = once_more(anew, found, first)
-        if not much and found.settled:
-            break
-    shut = replace(anew, antenna=task.antenna, wheel=task.wheel)
-    both = (_as_stamped(tried, tried.run(found.guess, gated=False)) for tried in (shut, anew))
-    anew_ratio = likelihood_ratio(*both)
-    return (
-        _Opened(anew, found.guess, found.track, anew_ratio)
-        if anew_ratio > ratio
-        else _Opened(open_, guess, late, ratio)
-    )
+    try:
+        found = begun(anew, first, anew.run(first, gated=False))
+        for _ in range(MORE_PASSES):
+            anew, much = anew.learnt(found.track)
+            found = once_more(anew, found, first)
+            if not much and found.settled:
+                break
+        shut = replace(anew, antenna=task.antenna, wheel=task.wheel)
+        both = (_as_stamped(tried, tried.run(found.guess, gated=False)) for tried in (shut, anew))
+        ratio = likelihood_ratio(*both)
+    except DataError:  # the filter broke down: what was found before stands
+        return usual
+    return _Opened(anew, found.guess, found.track, ratio) if ratio > usual.ratio else usual
 
 
 def _as_stamped(task: MovingTask, track: Track) -> list[Residuals]:
     """Residuals with the stamps of their logs, which the latency of a sensor has moved."""
-    lags = [("GNSS", task.antenna.latency), ("odometer", task.wheel.latency), ("velocity log", task.wheel.latency)]
-    moved_by = [(r, sum(lag for name, lag in lags if r.name.startswith(name))) for r in track.residuals]
-    return [replace(r, stamp=np.round(r.stamp + lag, CLOCK_DIGITS)) for r, lag in moved_by]
+    velocities = task.velocities or task.antenna
+    lags = {
+        "GNSS position": task.antenna.latency,
+        VELOCITIES: velocities.latency,
+        "odometer": task.wheel.latency,
+        "velocity log": task.wheel.latency,
+    }
+    return [replace(r, stamp=np.round(r.stamp + lags.get(r.name, 0.0), CLOCK_DIGITS)) for r in track.residuals]
 
 
 def _opened(mounting: Mounting) -> Mounting:

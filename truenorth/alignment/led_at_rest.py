@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from truenorth.alignment.in_motion_passes import turn_between
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.alignment.moving import fifteen
 from truenorth.alignment.procedure import align_base
@@ -60,7 +61,7 @@ def led_at_rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
     lat, C = task.position.lat, track.C_nb[end]
     horizontal = EARTH_RATE * math.cos(lat)
     heading = float(euler_from_dcm(C)[0])
-    off = abs(math.remainder(heading - rest.heading, 2.0 * math.pi))
+    off = abs(turn_between(C, rest.C_nb))
     doubt = max((item.effect.heading for item in rest.evidence), default=0.0)
     sigma = math.hypot(azimuth_sigmas(rest)[0], doubt, math.sqrt(fifteen(track)[end, PHI, PHI][2, 2]))
     off -= abs(float(np.mean(track.v_n[inside, 1]))) / (float(radii(lat)[0]) * horizontal)

@@ -115,7 +115,10 @@ def _likelier(
     best = max(ratios, key=ratios.__getitem__)
     ratio = ratios[best]
     if ratio > limit("rival") and led_by is not None:
-        same = led_by(gyros_later(record, -at), gyros_later(record, -best))
+        try:
+            same = led_by(gyros_later(record, -at), gyros_later(record, -best))
+        except DataError:  # the filter broke down: that beginning explains nothing
+            return best, tracks[best], ratio
         ratio = min(ratio, likelihood_ratio(not_of_gyros(same), tracks[best].residuals, one_model=True))
     return (best, tracks[best], ratio) if ratio > limit("rival") else None
 

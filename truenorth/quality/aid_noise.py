@@ -94,7 +94,8 @@ def _factors(residuals: Residuals, source: Aiding, least: Array, tails: bool) ->
         if int(there.sum()) < FEWEST:
             continue
         q = float(np.mean(difference[there])) if tails else _scale_of(difference[there])
-        if abs(q - 1.0) < limit("chance") * SPREAD / math.sqrt(there.sum()):
+        # Of a scale that is q times as large, or as small, the spread is as large a part: else a factor is never unlearnt.
+        if abs(q - 1.0) / min(max(q, 1e-9), 1.0) < limit("chance") * SPREAD / math.sqrt(there.sum()):
             continue
         known = np.isfinite(e[:, axis]) & (R[:, axis] > 0.0)
         share = float(np.median(S[known, axis] / R[known, axis])) if known.any() else 0.0

@@ -42,7 +42,7 @@ def repeats_of(same: NDArray[np.bool_]) -> Repeats:
     # Samples that are held repeat in all channels at once; quiet ones of a coarse quantum repeat each by itself.
     held = share > limit("held rows") and (share > 0.98 * least or _evenly(same)) and chance < 0.9 * share
     if held or share > 3.0 / same.shape[1] + 5.0 * chance + limit("repeated rows"):
-        return Repeats(count, share)
+        return Repeats(count, max(share - chance, 0.0))
     again = float(np.quantile(_written_again(same), QUARTER)) if count and chance < BY_CHANCE else 0.0
     return Repeats(count, again if again > limit("rows written again") else 0.0)
 

@@ -269,7 +269,7 @@ SENTENCES = {
     "innovations.at_rest": (
         "as of a vehicle at rest from {begin:.0f} to {end:.0f} s the log finds heading {rest:deg|.2f} ± {rest_sigma:deg|.2f} deg, "
         "and its gyros see the earth's rate; its aids move it by up to {speed:.2g} m/s, and turn heading to {heading:deg|.2f} deg: "
-        "the receiver may be led away"
+        "a receiver that is led away, or a wheel that spins"
     ),
     "innovations.elsewhere": (
         "{name}: {rejected} of {count} measurements rejected: all of them lie about {distance:.3g} m from where the track began"
