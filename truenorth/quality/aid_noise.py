@@ -27,8 +27,10 @@ Array = NDArray[np.float64]
 
 LEAST_FACTOR = 1.15  # of sigma: less is what a usual value is worth
 # Chi-square with one degree of freedom: half of all are smaller than the first, four fifths than the second. Noise with long tails
-# has the larger scale by the second; a sixth of the rows may be outliers.
+# has the larger scale by the second; a sixth of the rows may be outliers. A wheel's errors last for rows on end, and what is far
+# out among them is no outlier: of it nineteen of twenty rows count.
 QUANTILES = {0.5: 0.4549, 0.8: 1.6424}
+WHEEL, WHEELS = "odometer", {0.95: 3.8415}
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
 MOVES = 0.2  # m/s: a speed below it is standing
 
@@ -65,9 +67,10 @@ def noise_factors(
     return found
 
 
-def _scale_of(squares: Array) -> float:
-    """The larger scale of squares by two of their quantiles."""
-    return max(float(np.quantile(squares, share)) / usual for share, usual in QUANTILES.items())
+def _scale_of(squares: Array, name: str) -> float:
+    """The larger scale of squares by some of their quantiles; of a wheel, whose errors last for rows, of one more."""
+    quantiles = QUANTILES | (WHEELS if name == WHEEL else {})
+    return max(float(np.quantile(squares, share)) / usual for share, usual in quantiles.items())
 
 
 def _on_the_move(residuals: Residuals, track: Track) -> Residuals:
@@ -93,7 +96,7 @@ def _factors(residuals: Residuals, source: Aiding, least: Array, tails: bool) ->
         there = np.isfinite(difference)
         if int(there.sum()) < FEWEST:
             continue
-        q = float(np.mean(difference[there])) if tails else _scale_of(difference[there])
+        q = float(np.mean(difference[there])) if tails else _scale_of(difference[there], source.name)
         # Of a scale that is q times as large, or as small, the spread is as large a part: else a factor is never unlearnt.
         if abs(q - 1.0) / min(max(q, 1e-9), 1.0) < limit("chance") * SPREAD / math.sqrt(there.sum()):
             continue
