@@ -41,27 +41,6 @@ def test_gaps_and_jitter():
     assert found.sampling.jitter_rms == pytest.approx(0.003 * np.sqrt(2.0 / 3.0), rel=0.05)
 
 
-def test_rows_of_a_simulation_at_rest_repeat_by_rounding():
-    """Two fifths of the rows as the row before, the others but for their last digits: no sensor is held."""
-    rng = np.random.default_rng(4)
-    force = np.tile([0.0, 0.0, 9.8], (6000, 1)) * (1.0 + 1e-15 * rng.integers(0, 2, (6000, 1)))
-    rate = np.tile([0.0, 6e-5, 4e-5], (6000, 1)) * (1.0 + 1e-15 * rng.integers(0, 2, (6000, 1)))
-    found = inspect(ImuRecord(0.01 * np.arange(1, 6001), rate, force))
-    assert found.sampling.repeated_rows > 1000
-    assert "repeated_rows" not in codes(found)
-    noise = 1e-5 * np.repeat(rng.standard_normal((3000, 6)), 2, axis=0)
-    held = inspect(ImuRecord(0.01 * np.arange(1, 6001), rate[:1] + noise[:, :3], force[:1] + noise[:, 3:]))
-    assert "repeated_rows" in codes(held, "warning")
-
-
-def test_repeated_rows():
-    record = base(duration=30.0)
-    rows = np.arange(len(record)) // 2 * 2
-    found = inspect(ImuRecord(record.time, record.gyro[rows], record.accel[rows]))
-    assert found.sampling.repeated_rows == len(record) // 2
-    assert "repeated_rows" in codes(found, "warning")
-
-
 def test_frozen_and_dead_channels():
     record = base(duration=60.0)
     gyro, accel = record.gyro.copy(), record.accel.copy()
@@ -153,15 +132,6 @@ def test_a_channel_that_is_stuck_for_long_is_no_coarse_sensor():
     step = 20.0 * np.std(np.diff(record.gyro[:, 2]))
     for found, values in ((False, gyro), (True, stuck), (False, step * np.round(gyro / step))):
         assert ("frozen" in codes(inspect(ImuRecord(record.time, values, record.accel)))) == found
-
-
-def test_saturation():
-    record = base(amplitude=(10.0, 10.0, 5.0))
-    limit = np.radians(8.0)
-    found = inspect(ImuRecord(record.time, np.clip(record.gyro, -limit, limit), record.accel))
-    assert "saturated" in codes(found, "error")
-    assert found.sampling.saturated_rows[0] == np.count_nonzero(np.abs(record.gyro[:, 0]) >= limit)
-    assert np.all(found.sampling.saturated_rows[3:] == 0)
 
 
 @pytest.mark.parametrize(
@@ -370,83 +340,3 @@ def test_gravity_of_another_size_is_no_bias_of_an_unknown_imu(factor, words):
     answer = tn.align(replace(record, accel=factor * record.accel), Position(LAT, 0.0))
     assert answer.status == "inconsistent"
     assert words in " ".join(answer.reasons)
-
-
-def test_rows_that_are_held_are_found_though_their_channels_repeat_by_themselves():
-    """A coarse quantum: each channel repeats in half of its rows anyhow; rows that are held do at once, in runs of one length."""
-    rng = np.random.default_rng(4)
-    count = 6000
-    time = 0.01 * np.arange(1, count + 1)
-    gyro, accel = (np.round(0.7 * rng.standard_normal((count, 3)))[5 * (np.arange(count) // 5)] for _ in range(2))
-    held = ImuRecord(time, 1e-4 * gyro, 1e-2 * accel + [0.0, 0.0, 9.8], "increments")
-    assert "repeated_rows" in codes(inspect(held), "warning")
-    gyro, accel = (np.round(0.25 * rng.standard_normal((count, 3))) for _ in range(2))
-    quiet = ImuRecord(time, 1e-4 * gyro, 1e-2 * accel + [0.0, 0.0, 9.8], "increments")
-    assert "repeated_rows" not in codes(inspect(quiet))
-
-
-@pytest.mark.parametrize("again", [0.0, 0.07])
-def test_rows_written_again_stand_out_of_what_coarse_steps_repeat(again):
-    """Channels that repeat in a fifth to four fifths of the rows make one in a hundred repeat at once; others are written twice."""
-    rng = np.random.default_rng(8)
-    count = 30_000
-    counts = np.round(rng.standard_normal((count, 6)) * [1.2, 1.3, 0.7, 0.3, 1.0, 0.25])
-    rows = np.sort(np.concatenate([np.arange(count), np.flatnonzero(rng.random(count) < again)]))[:count]
-    counts = counts[rows] * [1e-5] * 6 + [0.0, 0.0, 0.0, 0.0, 0.0, 9.8e-2]
-    found = inspect(ImuRecord(0.01 * np.arange(1, count + 1), counts[:, :3], counts[:, 3:], "increments"))
-    assert found.sampling.repeated_rows > 100
-    assert ("repeated_rows" in codes(found, "warning")) == bool(again)
-
-
-def test_noise_that_is_clipped_on_one_side_alone():
-    """No range has sides so unlike; but of values with many digits no two are alike by chance."""
-    record = base(duration=60.0)
-    gyro = record.gyro.copy()
-    gyro[:, 1] = np.minimum(gyro[:, 1], np.quantile(gyro[:, 1], 0.98))
-    assert "saturated" in codes(inspect(ImuRecord(record.time, gyro, record.accel)), "error")
-
-
-def test_a_vibration_is_clipped_row_by_row():
-    """Of a vibration near half the rate of the log no two peaks follow each other."""
-    record = base(duration=30.0)
-    t = record.time
-    accel = record.accel + np.array([2.0, 0.0, 0.0]) * np.sin(2.0 * np.pi * 37.3 * t)[:, None]
-    assert "saturated" not in codes(inspect(ImuRecord(t, record.gyro, accel)))
-    accel[:, 0] = np.clip(accel[:, 0], -1.9, 1.9)
-    assert "saturated" in codes(inspect(ImuRecord(t, record.gyro, accel)))
-
-
-def test_counts_that_come_in_fours_are_no_end_of_a_range():
-    """A pulse train whose four edges are counted: every fourth value is full. What is clipped between two counts is."""
-    rng = np.random.default_rng(6)
-    record = base(duration=60.0)
-    levels = {-8.0: 0.1, -7.0: 0.001, -4.0: 0.2, -3.0: 0.001, 0.0: 0.688, 4.0: 0.01}
-    counts = rng.choice(list(levels), len(record), p=list(levels.values()))
-    for most, found in ((np.inf, False), (6.4, True)):
-        accel = record.accel.copy()
-        accel[:, 0] = 0.12 * np.clip(counts, -most, most)
-        assert ("saturated" in codes(inspect(ImuRecord(record.time, record.gyro, accel)))) == found
-
-
-def test_counts_summed_by_arithmetic_are_alike():
-    """Sums of counts times their size differ by rounding: such neighbours are one level, and make no pile of it."""
-    rng = np.random.default_rng(7)
-    record = base(duration=60.0)
-    counts, other = rng.choice([0.0, 2.0, 4.0], len(record), p=[0.4, 0.2, 0.4]), rng.random(len(record)) < 0.01
-    accel = record.accel.copy()
-    accel[:, 0] = 0.1 * counts - 1e-16 * other
-    assert len(np.unique(accel[:, 0])) > 3
-    assert "saturated" not in codes(inspect(ImuRecord(record.time, record.gyro, accel)))
-
-
-@pytest.mark.parametrize("stuck", [False, True])
-def test_a_counter_whose_mean_is_a_count_stays_at_it(stuck):
-    """What a row leaves is counted in the next: at a mean of 1.004 pulses one more comes every 250 rows."""
-    record = base(duration=120.0)
-    mean = np.where(np.abs(np.arange(len(record)) - 6000) < 400, 1.004, 1.3)
-    pulses = np.diff(np.floor(np.cumsum(np.append(0.5, mean))))
-    if stuck:
-        pulses[1000:1300] = 1.0
-    accel = record.accel.copy()
-    accel[:, 0] = 0.01 * pulses
-    assert ("frozen" in codes(inspect(ImuRecord(record.time, record.gyro, accel)))) == stuck

@@ -45,7 +45,7 @@ from truenorth.estimate.poorer import ALONE, poorer_evidence, poorer_rivals, poo
 from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
-from truenorth.quality.aid_noise import noise_factors
+from truenorth.quality.aid_noise import LOUD, noise_factors
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.slow_aids import FIXES, SPEEDS
@@ -70,7 +70,6 @@ PASSES, MORE_PASSES = 2, 6
 # turns the products of a larger error with tilts, biases and axes pass for knowledge, and level was up to seven sigmas off.
 SURE = math.radians(7.5)
 SURELY = 3.0  # sigmas of heading, within which guesses of the bank are those of one track
-LOUD = 3.0  # times its sigma, that an aid is so noisy that the first pass begins anew with what it is
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2
 

@@ -19,7 +19,7 @@ from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.second_look import SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size
-from truenorth.quality.aid_noise import changed, louder, noise_factors, noise_notes
+from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 
 COARSE = 1.0  # s, between predictions of a filter that looks for the receiver's errors
 PART = 900.0  # s of a log, that show them: some ten times as long as they last
-WHEEL, LOUD = "odometer", 3.0  # times its sigma, from which a wheel's noise is learnt
 NOISE_PASSES = 4
 MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 

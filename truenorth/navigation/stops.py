@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.source import Aiding
 from truenorth.core.earth import radii
 from truenorth.core.errors import UsageError
+from truenorth.quality.aid_noise import STANDING
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.quality.regimes import DISTURBED, STILL, motion_summary
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
@@ -23,7 +24,6 @@ DISTURBED_VELOCITY = 0.03  # m/s, of one that people, wind or an engine shake
 BIAS_CHANGE = math.radians(
     0.05
 )  # rad/s: of poor gyros while they warm up, or by the earth's rate when a vehicle has turned
-STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
 FEWEST_FIXES = 5  # through which a line is laid
 REACHES = (2.0, 5.0, 10.0, 20.0)  # s before and after a fix
 SHARP = 0.4  # of the speed of standing: one sigma of a slope that is sharp enough

@@ -32,7 +32,8 @@ LEAST_FACTOR = 1.15  # of sigma: less is what a usual value is worth
 QUANTILES = {0.5: 0.4549, 0.8: 1.6424}
 WHEEL, WHEELS = "odometer", {0.95: 3.8415}
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
-MOVES = 0.2  # m/s: a speed below it is standing
+STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
+LOUD = 3.0  # times its sigma, that an aid is so noisy that what a first pass found is made of noise
 
 
 def noise_factors(
@@ -76,7 +77,7 @@ def _scale_of(squares: Array, name: str) -> float:
 def _on_the_move(residuals: Residuals, track: Track) -> Residuals:
     """Those of a vehicle that moves: a wheel that stands is exact, and says nothing of its noise."""
     speed = np.linalg.norm(track.v_n, axis=1)
-    moves = np.interp(residuals.stamp, track.time, speed) > MOVES
+    moves = np.interp(residuals.stamp, track.time, speed) > STANDING
     return replace(
         residuals,
         innovation=residuals.innovation[moves],
