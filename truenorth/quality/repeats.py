@@ -28,7 +28,7 @@ HALVINGS = 40  # of the interval in which it lies
 
 
 class Repeats(NamedTuple):
-    """Rows that repeat the one before in all channels: how many, and the share of the log that chance does not explain."""
+    """Rows that repeat the one before in all channels: how many, and what share of the log where that is more than chance gives."""
 
     rows: int
     beyond: float
@@ -42,7 +42,7 @@ def repeats_of(same: NDArray[np.bool_]) -> Repeats:
     # Samples that are held repeat in all channels at once; quiet ones of a coarse quantum repeat each by itself.
     held = share > limit("held rows") and (share > 0.98 * least or _evenly(same)) and chance < 0.9 * share
     if held or share > 3.0 / same.shape[1] + 5.0 * chance + limit("repeated rows"):
-        return Repeats(count, max(share - chance, 0.0))
+        return Repeats(count, share)
     again = float(np.quantile(_written_again(same), QUARTER)) if count and chance < BY_CHANCE else 0.0
     return Repeats(count, again if again > limit("rows written again") else 0.0)
 
