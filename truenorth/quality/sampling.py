@@ -167,8 +167,8 @@ def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding
             Finding(
                 "warning" if share > 5.0 else "note",
                 "repeated_rows",
-                f"{repeated} rows ({share:.1f} %, more than chance gives) repeat the row before in all six channels; expected new values in "
-                "each row: the log may be written faster than the sensor samples; log at the sensor's rate",
+                f"{repeated} rows ({share:.1f} %, more than chance gives) repeat the row before in all six channels; "
+                "expected new values in each row: the log may be written faster than the sensor samples; log at the sensor's rate",
             )
         )
     return repeated
