@@ -33,6 +33,8 @@ SURE = 0.98  # probability from which a reading is taken without a question
 SURE_GYRO = 0.995  # of a gyro's unit: drawn sensors were read wrong at .989 in 2 of 1032 logs
 TOLERANCE = 0.12  # of gravity: beyond it no reading of the accelerometers is one
 CELL = 0.1  # s
+REST_CELL = 1.0  # s, of which a log is at rest or is moved
+RESTS = 30.0  # times as much as at rest the gyros show of a sensor that a hand moves
 JUDGED = 2**21  # rows that say what the numbers of a log are: three hours at 200 Hz
 WALKS = (DEG / 60.0 * 5e-5, DEG / 60.0 * 3.0)  # rad/sqrt(s): random walks of the best and the worst gyros
 LARGEST_BIAS = 5.0 * DEG  # rad/s
@@ -135,12 +137,31 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
         data = data / interval
     rates = data.reshape(cells, rows, 6).mean(axis=1).T if cells else np.zeros((6, 0))
     turning = fit_turning(rows * interval, np.ascontiguousarray(rates))
+    largest = float(np.quantile(np.abs(data[:, :3]), 0.999)) if len(data) else 0.0
+    data = _at_rest_part(data, interval)
     walk, force_walk = _random_walk(data[:, :3], interval), _random_walk(data[:, 3:], interval)
     parts = [part.mean(axis=0) for part in np.array_split(data[:, :3], 10)] if len(data) >= 100 else []
     wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
     mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
-    largest = float(np.quantile(np.abs(data[:, :3]), 0.999)) if len(data) else 0.0
     return GyroFacts(turning, mean, wander, walk, largest, force_walk)
+
+
+def _at_rest_part(data: Array, interval: float) -> Array:
+    """The longest rest of a sensor that is moved for a part of the log; the whole log where none stands out.
+
+    What the gyros say at rest (their bias, the earth's rate, their noise) nothing says while a hand turns them.
+    """
+    rows = max(2, round(REST_CELL / interval))
+    cells = len(data) // rows
+    if cells < 5:
+        return data
+    spread = np.linalg.norm(data[: cells * rows, :3].reshape(cells, rows, 3).std(axis=1), axis=1)
+    quiet = np.quantile(spread, 0.1)
+    if not np.quantile(spread, 0.9) > RESTS * quiet:
+        return data
+    rest = np.flatnonzero(spread <= 3.0 * quiet)
+    run = max(np.split(rest, np.flatnonzero(np.diff(rest) > 1) + 1), key=len)
+    return data[run[0] * rows : (run[-1] + 1) * rows]
 
 
 def _random_walk(data: Array, interval: float) -> float:

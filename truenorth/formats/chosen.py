@@ -79,7 +79,7 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
         choice.guesses.append(Guess("time", best, why, 1.0, {"columns": {"time": best}}))
         _note_unit(choice, True, clocks[best])
         return choice
-    wrong = [name for name in clocks if len(columns.column(name)) > 1]
+    wrong = [name for name in clocks if len(columns.column(name)) > 1 and not _stands(columns, name)]
     if wrong and layout.rate is None:
         choice.time = (wrong[0],)  # which is refused with the row that is wrong
         _note_unit(choice, True, clocks[wrong[0]])
@@ -105,6 +105,15 @@ def _scatter(columns: Columns, name: str) -> float | None:
     median = float(np.median(steps))
     near = steps[steps < 3.0 * median]
     return float(np.sqrt(np.mean((near / median - 1.0) ** 2)))
+
+
+def _stands(columns: Columns, name: str) -> bool:
+    """Whether a clock has one value in all rows, as that of a receiver without satellites: it is no clock."""
+    try:
+        time = columns.clock(name)[0]
+    except DataError:
+        return False
+    return bool(np.all(time == time[0]))
 
 
 def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
