@@ -13,7 +13,7 @@ from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import UsageError
 from truenorth.damping.bands import filter_bands
 from truenorth.damping.course import linearised, without_errors
-from truenorth.damping.drift import likely_drift
+from truenorth.damping.drift import likely_drifts
 from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
 from truenorth.damping.navigation import change_filter
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
@@ -100,7 +100,7 @@ def test_the_time_of_a_drift_is_found(truth, hours, low, high):
     if math.isfinite(hours):
         drift = gauss_markov(0.5, hours * HOUR, truth.interval, len(truth.time), rng, axes=2)
     kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
-    found = likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.3))
+    found = likely_drifts(course, reference(truth, drift), 0, kind, LogErrors(0.3))[0]
     assert low * HOUR <= found.time <= high * HOUR
     if math.isfinite(hours):  # the walk, which the data show, to a quarter
         assert found.drift / math.sqrt(found.time) == pytest.approx(0.5 / math.sqrt(hours * HOUR), rel=0.25)
@@ -115,7 +115,7 @@ def test_a_drift_that_wanders_a_little_is_no_constant(truth, seed):
     _, course = free(truth, model, rng)
     drift = gauss_markov(0.1, 12.0 * HOUR, truth.interval, len(truth.time), rng, axes=2)
     kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
-    assert likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.5)).time <= 768.0 * HOUR
+    assert likely_drifts(course, reference(truth, drift), 0, kind, LogErrors(0.5))[0].time <= 768.0 * HOUR
 
 
 def test_a_gate_goes_on_past_a_part_with_a_fix(truth):
@@ -224,4 +224,4 @@ def test_a_current_that_is_smooth_from_row_to_row_is_no_constant(truth, seed):
         [np.convolve(np.pad(x, len(window) // 2, "edge"), window / window.sum(), "valid") for x in steps.T], axis=1
     )
     kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
-    assert likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.5)).time < 48.0 * HOUR
+    assert likely_drifts(course, reference(truth, drift), 0, kind, LogErrors(0.5))[0].time < 48.0 * HOUR

@@ -16,6 +16,7 @@ filters); J. Farrell, M. Barth, *The Global Positioning System and Inertial Navi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,11 @@ class Bands(NamedTuple):
 
     errors: Array
     residual: Array
+
+
+def widest(bands: Sequence[Bands]) -> Bands:
+    """The largest of several, each by another reading of the log's errors of which none is ruled out."""
+    return Bands(*(np.max(sizes, axis=0) for sizes in zip(*bands, strict=True)))
 
 
 def network_bands(course: Track, loop: Loop, whole: Filter, mu: Array, *, log: bool) -> Bands:

@@ -8,9 +8,11 @@ A turn of 1 deg/s moves a log 30 m ahead by half a metre a second sideways. Take
 and place 5 to 6 of their sigmas wrong. An arm that nobody has said is found before any filter runs. What INS and log differ by
 otherwise, Schuler's oscillation and a current, runs straight over two `SPAN`, so that for second differences of means
 
-    D(v_INS - v_log) = -D(d/dt C_nb) l - D(G) e + noise
+    D(v_INS - v_log) = -D(d/dt C_nb) l - D(G) e + D(int C_nb dt) b + noise
 
-with ``G e`` the scale, mounting and bias of :mod:`truenorth.errors.log`, by robust least squares with their sigmas a priori. The
+with ``G e`` the scale, mounting and bias of :mod:`truenorth.errors.log` and b the biases of the accelerometers, which turn with the
+hull and change the INS's velocity as it turns (of 250 ug an arm of nothing was found 1.8 m off, ten of its sigmas), by robust least
+squares with their sigmas a priori. The
 means are by Hann's window, twice `SPAN` long: they have turns in them and no sway, of which the filters of many logs leave a
 part. How far the log is below the IMU they hardly show, nor does it matter to them. A log of forward speed alone, taken to make
 no leeway, has the arm to the point about which the hull turns.
@@ -21,6 +23,7 @@ Source: P. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Nav
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -31,6 +34,7 @@ from truenorth.damping.course import motion_at
 from truenorth.damping.waves import SPAN, hann_means
 from truenorth.errors.log import DRIFT, LogErrors, log_rows
 from truenorth.records import VelocityRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
@@ -41,6 +45,7 @@ HULL = 15.0  # m, one sigma: how far from the IMU a log may sit of which nothing
 CLEAR = 3.0  # sigmas: an arm that is named
 FEWEST = 30  # differences, below which none is sought
 LEAST_NOISE = 1e-4  # m/s
+LEAST_BIAS = 1e-9  # m/s^2, of an IMU without
 # Covariance of second differences of such means of white noise with the next three, their variance being 1:
 LAGS = (-0.607, 0.071, 0.036)
 
@@ -60,7 +65,7 @@ class Arm(NamedTuple):
 
 
 def at_the_imu(
-    course: Track, record: VelocityRecord, mounting: Mounting | None, errors: LogErrors
+    course: Track, record: VelocityRecord, mounting: Mounting | None, errors: LogErrors, spec: ImuSpec
 ) -> tuple[VelocityRecord, Arm | None]:
     """A log as it would be at the IMU, and the arm by which it was carried there, where that was sought.
 
@@ -74,6 +79,8 @@ def at_the_imu(
         An arm of zero, and none at all, is one of which nothing is said: it is sought within `HULL`.
     errors : LogErrors
         Its slow errors.
+    spec : ImuSpec
+        Of the IMU.
     """
     known = np.zeros(3) if mounting is None else np.asarray(mounting.lever_arm, dtype=np.float64)
     sigma = 0.0 if mounting is None else mounting.lever_arm_sigma
@@ -81,7 +88,7 @@ def at_the_imu(
         record = carried(course, record, known)
     else:
         sigma = sigma or HULL
-    found = sought(course, record, errors, sigma) if sigma else None
+    found = sought(course, record, errors, sigma, spec) if sigma else None
     if found is None:
         return record, None
     return carried(course, record, found.arm), Arm(known + found.arm, found.sigma)
@@ -97,8 +104,9 @@ def carried(course: Track, record: VelocityRecord, arm: Array) -> VelocityRecord
     return replace(record, velocity=velocity)
 
 
-def sought(course: Track, record: VelocityRecord, errors: LogErrors, sigma: float) -> Arm | None:
+def sought(course: Track, record: VelocityRecord, errors: LogErrors, sigma: float, spec: ImuSpec) -> Arm | None:
     """The arm that the hull's turns and sway show, about zero with a one-sigma a priori; None: too few rows."""
+    from scipy.integrate import cumulative_trapezoid
     from scipy.optimize import least_squares
 
     inside = _inside(course, record)
@@ -112,7 +120,8 @@ def sought(course: Track, record: VelocityRecord, errors: LogErrors, sigma: floa
     if record.frame == "body":
         velocity = np.einsum("kij,kj->ki", C_nb, velocity)
     groups = tuple(group for group in errors.groups() if group.name != DRIFT)
-    shown = np.concatenate([turning[:, :2, :2], log_rows(groups, C_nb, v_n)], axis=2)
+    pushed = -cumulative_trapezoid(C_nb[:, :2, :2], time, axis=0, initial=0.0)
+    shown = np.concatenate([turning[:, :2, :2], pushed, log_rows(groups, C_nb, v_n)], axis=2)
     off, count = (v_n - velocity)[:, :2], shown.shape[2]
     found, _ = hann_means(time, np.hstack([off, shown.reshape(len(time), -1)]), float(time[0]), SPAN)
     apart = np.diff(found, 2, axis=0)
@@ -122,7 +131,8 @@ def sought(course: Track, record: VelocityRecord, errors: LogErrors, sigma: floa
         return None
     z, H = np.where(there, z, 0.0), np.where(there[:, None], H, 0.0)
     noise = max(float(1.4826 * np.median(np.abs(z[there]))), LEAST_NOISE)
-    prior = np.concatenate([np.full(2, sigma), *(group.prior for group in groups)])
+    bias = max(math.sqrt(spec.bias_variance[3]), LEAST_BIAS)
+    prior = np.concatenate([np.full(2, sigma), np.full(2, bias), *(group.prior for group in groups)])
     J = np.vstack([H / noise, np.diag(1.0 / prior)])
     y = np.append(-z / noise, np.zeros(len(prior)))
     x = least_squares(lambda x: J @ x - y, np.zeros(len(prior)), jac=lambda x: J, loss="soft_l1", f_scale=2.0).x

@@ -25,9 +25,9 @@ from truenorth.damping.answer import (
     spectrum_of,
     switched,
 )
-from truenorth.damping.bands import filter_bands, network_bands
+from truenorth.damping.bands import filter_bands, network_bands, widest
 from truenorth.damping.course import motion_at, place_at, without_errors
-from truenorth.damping.drift import likely_drift
+from truenorth.damping.drift import likely_drifts
 from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
 from truenorth.damping.log_arm import at_the_imu
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
@@ -125,10 +125,12 @@ def damp_navigation(
             "earlier start"
         )
     finest = course if fine is None else even(fine)
-    log = LogOn(None, LogErrors(0.0), False, None) if velocity is None else _log_on(course, velocity, finest)
-    errors, evidence = _with_drift(course, log, spec, others, start)
-    whole = replace(_whole(course, log, errors, spec, others, start), fixes=_fixes_on(course, finest, fixes, start))
-    found = _damped(course, log.reference, spec, damper, start, whole, errors)
+    log = LogOn(None, LogErrors(0.0), False, None) if velocity is None else _log_on(course, velocity, finest, spec)
+    drifts, evidence = _with_drift(course, log, spec, others, start)
+    fixed = _fixes_on(course, finest, fixes, start)
+    wholes = [replace(_whole(course, log, errors, spec, others, start), fixes=fixed) for errors in drifts]
+    whole = wholes[0]
+    found = _damped(course, log.reference, spec, damper, start, wholes, drifts[0])
     damped = without_errors(course, found.x)
     seen = slice(start, None)
     base = 0.0 if log.reference is None else log.reference.velocity[seen]
@@ -170,10 +172,10 @@ def damp_navigation(
     return judged_navigation(replace(result, track=track, damping=report), evidence)
 
 
-def _log_on(course: Track, velocity: VelocityLog, seen: Track) -> LogOn:
+def _log_on(course: Track, velocity: VelocityLog, seen: Track, spec: ImuSpec) -> LogOn:
     record = _mounted(velocity.record, velocity.mounting)
     errors = log_errors(velocity.errors, record.frame)
-    record, arm = at_the_imu(seen, record, velocity.mounting, errors)
+    record, arm = at_the_imu(seen, record, velocity.mounting, errors, spec)
     return LogOn(reference_of(course, record, errors, seen), errors, record.frame == "body", arm)
 
 
@@ -203,17 +205,17 @@ def _fixes_on(course: Track, seen: Track, fixes: Fixes, start: int) -> FixRows |
 
 def _with_drift(
     course: Track, log: LogOn, spec: ImuSpec, others: Sequence[Group], start: int
-) -> tuple[LogErrors, list[Evidence]]:
-    """Errors of the log; a drift of which nobody knows how long it lasts is found."""
+) -> tuple[tuple[LogErrors, ...], list[Evidence]]:
+    """Errors of the log; a drift of which nobody knows how long it lasts is found, in one reading of it or two."""
     errors = log.errors
     if log.reference is None or errors.drift == 0.0 or errors.drift_time is not None:
-        return errors, []
+        return (errors,), []
     kind = _whole(course, log, errors, spec, others, start)
     calm = over_waves(course, log.reference.velocity, log.reference.noise, start)
-    found = likely_drift(course, calm.velocity, start, replace(kind, sigma=calm.noise), errors, calm.course)
-    if math.isinf(found.time):
+    found = likely_drifts(course, calm.velocity, start, replace(kind, sigma=calm.noise), errors, calm.course)
+    if math.isinf(found[0].time):
         return found, [note("log.constant")]
-    return found, [note("log.drifts", drift=found.drift, hours=found.time / 3600.0)]
+    return found, [note("log.drifts", drift=found[0].drift, hours=found[0].time / 3600.0)]
 
 
 def _whole(course: Track, log: LogOn, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:
@@ -278,15 +280,16 @@ def _damped(
     spec: ImuSpec,
     damper: Damper,
     start: int,
-    whole: Filter,
+    wholes: Sequence[Filter],
     errors: LogErrors,
 ) -> Found:
+    whole = wholes[0]
     x = np.zeros((len(course), MOTION.stop))
     rest = course[start:]
     if damper.method == "none":
         return Found(x, None, None, None)
     if damper.method in ("internal", "external"):
-        return _by_network(course, reference, damper, start, whole)
+        return _by_network(course, reference, damper, start, wholes)
     assert reference is not None  # checked before
     if damper.method == "augmented":
         calm = over_waves(course, reference.velocity, reference.noise, start)
@@ -310,7 +313,8 @@ def _damped(
         estimate = fused
     x[start:] = estimate.x[:, MOTION]
     absent = np.asarray(np.isnan(reference.velocity[start:]).any(axis=1))
-    return Found(x, filter_bands(rest, whole, one, two, known, absent), estimate, None)
+    bands = widest([filter_bands(rest, whole, one, two, known, absent) for whole in wholes])
+    return Found(x, bands, estimate, None)
 
 
 def change_filter(one: Filter, errors: LogErrors, interval: float) -> Filter:
@@ -328,7 +332,7 @@ def _by_network(
     reference: Reference | None,
     damper: Damper,
     start: int,
-    whole: Filter,
+    wholes: Sequence[Filter],
 ) -> Found:
     """A network's correction, its bands, and what manoeuvres add to those of internal damping."""
     loop, at = _loop(damper), float(course.time[start])
@@ -338,7 +342,8 @@ def _by_network(
     found = switching(course, loop.network, sigma) if internal else None
     mu = found.mu if found is not None and damper.switching else np.ones(len(course))
     x = network_correction(course, loop, used, start=at, ramp=damper.ramp, mu=mu)
-    bands = network_bands(course[start:], loop, whole, mu[start:], log=used is not None)
+    by_log = used is not None
+    bands = widest([network_bands(course[start:], loop, whole, mu[start:], log=by_log) for whole in wholes])
     if found is not None:  # a manoeuvre's part alone, as if the rest of the velocity were known
         still = course.v_n[:, :2] - found.manoeuvre
         added = network_correction(course, loop, still, start=at, ramp=damper.ramp, mu=mu)
