@@ -11,8 +11,11 @@ from truenorth.aiding.sensors import from_gnss
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_task import usual_antenna
+from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.estimate.poorer import poorer
 from truenorth.quality.aid_noise import changed, noise_factors
+from truenorth.quality.density import with_noise_of
+from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
 from truenorth.state.layout import Layout
 from truenorth.state.track import Residuals, Track
@@ -126,6 +129,39 @@ def test_a_class_of_imu_that_is_too_good_is_the_suspect(late):
     assert answer.status == "inconsistent"
     assert answer.evidence[0].key == "specification.suspect"
     assert answer.evidence[0].remedies == ("specification",)
+
+
+@pytest.mark.parametrize("times", [(1.0, 1.0), (20.0, 1.0), (1.0, 20.0)])
+def test_noise_of_rows(times):
+    """White noise of a turning base, by its rows, where it is far more than a specification says; else not at all."""
+    spec, rng = imu_spec("tactical"), np.random.default_rng(SEED)
+    t = np.arange(1, 6001) / 100.0
+    walks = np.repeat([spec.gyro_random_walk * times[0], spec.accel_random_walk * times[1]], 3)
+    data = np.sin(t)[:, None] * [0.1, 0.1, 0.3, 1.0, 1.0, 0.1] + walks * rng.standard_normal((len(t), 6)) * 10.0
+    data[:, 5] += 9.8
+    found = with_noise_of(ImuRecord(t, data[:, :3], data[:, 3:]), spec)
+    if times == (1.0, 1.0):
+        assert found is spec
+        return
+    assert found.gyro_random_walk == pytest.approx(spec.gyro_random_walk * times[0], rel=0.15)
+    assert found.accel_random_walk == pytest.approx(spec.accel_random_walk * times[1], rel=0.15)
+    assert found.gyro_turn_on_bias == spec.gyro_turn_on_bias
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", range(3))
+def test_a_vehicle_that_vibrates_is_aligned(run):
+    """Rows ten times as noisy as the specification says and more, as of a vibration that they do not sample."""
+    log = car("GNSS, car", run)
+    rng = np.random.default_rng([SEED, run])
+    size = np.repeat([np.radians(rng.uniform(0.2, 0.5)), 9.8 * rng.uniform(0.05, 0.2)], 3) * log.record.interval
+    noise = size * rng.standard_normal((len(log.record), 6))
+    record = replace(log.record, gyro=log.record.gyro + noise[:, :3], accel=log.record.accel + noise[:, 3:])
+    answer = align_in_motion(record, "industrial", gnss=log.aiding["gnss"])
+    assert answer.status == "aligned", answer.reasons
+    assert any(item.key == "specification.noisier" for item in answer.evidence)
+    phi = rotation_vector_from_dcm(answer.C_nb @ log.C_nb(answer.time).T)
+    assert np.all(np.abs(phi) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
 
 
 def test_a_poorer_imu_has_larger_errors_alone():

@@ -32,7 +32,7 @@ from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.suspect import name_specification
+from truenorth.alignment.suspect import as_noisy_as_its_rows, name_specification
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
@@ -166,6 +166,7 @@ def align_in_motion(
         return _aligned(task.with_spec(spec), method, heading_limit, passes, unknown, tell)
 
     answer = _aligned(task, method, heading_limit, passes, unknown, tell)
+    answer = as_noisy_as_its_rows(answer, task.record, aligned)
     return name_specification(answer, aligned)
 
 
@@ -350,8 +351,9 @@ def _published(
 
 
 def _north_by_gyros(task: MovingTask) -> tuple[float, bool]:
-    """Bias of a gyro by the specification, rad/s, and whether it lets the earth's rate tell heading."""
-    bias = float(np.sqrt(task.spec.bias_variance[0]))
+    """Bias of a gyro by its specification, with its noise over the log, rad/s; whether the earth's rate tells heading."""
+    noise = task.spec.gyro_random_walk / math.sqrt(task.record.duration)
+    bias = math.hypot(float(np.sqrt(task.spec.bias_variance[0])), noise)
     return bias, bias < EARTH_RATE * math.cos(task.position.lat) * math.sin(GYROCOMPASS)
 
 

@@ -230,6 +230,10 @@ SENTENCES = {
         "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:imu}) says "
         "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
     ),
+    "specification.noisier": (
+        "the rows are noisier than the specification ({imu:imu}) says, the gyros {gyro:.3g} times and the accelerometers "
+        "{accel:.3g} times: a vehicle that vibrates, or another sensor; the answer is by the noise of the rows"
+    ),
     "specification.suspect": (
         "the specification ({imu:imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"
     ),
