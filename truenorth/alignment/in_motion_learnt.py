@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.estimate.latency import SHOWN_DELAY
+from truenorth.estimate.latency import delay_notes
 from truenorth.quality.aid_noise import LEAST_FACTOR, noise_notes
 from truenorth.state.evidence import Evidence, note
 
@@ -31,8 +31,4 @@ def learnt_evidence(
     found = noise_notes(factors)
     if scatter > 0.0:
         found.append(note("noise.stamps", name="GNSS", size=scatter))
-    for name, (delay, sigma) in delays.items():
-        if abs(delay) > max(SHOWN_DELAY * sigma, 0.02):
-            late = "late" if delay > 0.0 else "early"
-            found.append(note(f"delay.{late}", name=name, size=abs(delay), sigma=sigma))
-    return found
+    return found + delay_notes(delays)
