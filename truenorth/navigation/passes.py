@@ -23,6 +23,7 @@ from truenorth.navigation.second_look import SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
+from truenorth.quality.swing import with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.state import Start
@@ -57,7 +58,7 @@ class Plan:
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
-        used = [*sensors, *self.always]
+        used = [*with_unseen_arm(sensors, self.record), *self.always]
         return navigate_track(
             self.record,
             self.start,
