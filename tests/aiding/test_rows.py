@@ -6,6 +6,7 @@ import pytest
 from truenorth.aiding.heading import HEADING
 from truenorth.aiding.magnetometer import FIELD
 from truenorth.aiding.source import KINDS, Aiding, state
+from truenorth.aiding.velocity import SMOOTHED_VELOCITY
 from truenorth.aiding.wheel import COUNTED_FORWARD, WHEEL
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.linalg import padded
@@ -25,7 +26,7 @@ MODEL = InsModel(0.0, 0.0, groups=(Group("slow gyro bias", np.full(3, 1e-6), 300
 W_B = np.array([0.3, -0.2, 0.5])
 
 
-ROWS = {**KINDS, "odometer": WHEEL, "heading": HEADING, "magnetic field": FIELD}
+ROWS = {**KINDS, "odometer": WHEEL, "heading": HEADING, "magnetic field": FIELD, "smoothed velocity": SMOOTHED_VELOCITY}
 
 LATE = {"body velocity": 0.05, "odometer": 0.05, "heading": 0.02 * np.linalg.norm(W_B)}
 
@@ -34,7 +35,11 @@ def _aiding(kind):
     states = {}
     for role, length in ROWS[kind].sizes.items():
         states |= state("sensor", role, np.ones(length))
-    measured = {"position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0], "heading": [0.3]}.get(kind, [1.0, 2.0, 3.0])
+    measured = {
+        "position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0],
+        "heading": [0.3],
+        "smoothed velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6],
+    }.get(kind, [1.0, 2.0, 3.0])
     C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
     figures = {"magnetic field": (0.05, 0.4, -0.9), "odometer": COUNTED_FORWARD}.get(kind, ())
     arm = np.array([1.0, -2.0, 3.0])

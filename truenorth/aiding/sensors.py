@@ -55,7 +55,8 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
     record : GnssRecord
         Rows of quality 0 (no fix) and 6 (dead reckoning) are left out.
     mounting : Mounting
-        Of the antenna. The second one lies along the forward axis of ``C_mb``, to `angle_sigma`.
+        Of the antenna. The second one lies along the forward axis of ``C_mb``, to `angle_sigma`. Velocities may be as late as its
+        `velocities` say, and have a delay of their own then.
     heights : bool
         Use heights and vertical velocities.
 
@@ -92,7 +93,8 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
             measured[:, 2] = np.nan
         sigma = _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
         states = states_of(mounting, "GNSS", "lever arm", "lag")
-        found.append(rows_of("velocity", moving, measured, sigma, states))
+        shown = rows_of("velocity", moving, measured, sigma, states)
+        found.append(shown if mounting.velocities is None else _of_own_clock(shown, mounting))
     turned = record.has_heading & sound
     if turned.any() and record.heading is not None:
         states = states_of(mounting, "GNSS", "lag")
@@ -113,6 +115,13 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
             )
         )
     return found
+
+
+def _of_own_clock(source: Aiding, mounting: Mounting) -> Aiding:
+    """A receiver's velocities with the delay that is theirs alone."""
+    own = mounting.of_velocities
+    states = {**source.states, **states_of(replace(mounting, latency_sigma=own.latency_sigma), source.name, "lag")}
+    return replace(source, time=source.time + mounting.latency - own.latency, states=states)
 
 
 def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:

@@ -1,14 +1,23 @@
 """Velocity of an antenna or of a log that knows north, as a row of the closed loop; see :mod:`truenorth.aiding.position`.
 
 Its own states are a drift east and north (:mod:`truenorth.errors.log`): ``z = v_hat + d - measured``.
+
+An antenna moves by ``w x l`` besides its vehicle. A receiver that filters its velocities does not show all of what is quick in
+that: with q the part of w that is quicker than its filter, and d the arm whose swing it leaves out, it shows
+
+    y = v + C (w x l - q x d):  z = y_hat - y = ... - C (w x dl) + C (q x dd)
+
+So an arm that nobody has said is known by slow turns and by places, and what is quick says how much of it is shown, l - d, alone.
+Else the swing that is missing would be a shorter arm (ours; :mod:`truenorth.quality.swing`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from truenorth.aiding.position import convergence, into_north
-from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, AT_OWN, Row, lag_now, row, with_state
+from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_FILTER, AT_LAG, AT_OWN, Row, lag_now, row, with_state
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
@@ -18,7 +27,18 @@ _PHI, _DV, _DP, _BG = 0, 3, 6, 9
 
 @compiled
 def velocity_row(
-    s: Any, C: Any, w_b: Any, push: Any, arm: Any, lag: float, at_arm: int, at_lag: int, measured: Any, H: Any, z: Any
+    s: Any,
+    C: Any,
+    w_b: Any,
+    push: Any,
+    arm: Any,
+    unseen: Any,
+    lag: float,
+    at_arm: int,
+    at_lag: int,
+    measured: Any,
+    H: Any,
+    z: Any,
 ) -> None:
     """Velocity of an antenna, east, north, up, m/s; as :func:`position_row`.
 
@@ -28,8 +48,11 @@ def velocity_row(
         Rate of the body against the earth, body axes.
     push : tuple of 3, m/s^2
         Change of the velocity along w.
+    unseen : tuple of 3, m/s
+        What of the swing about the IMU is not shown, body axes.
     """
-    u_b = cross(w_b, arm)
+    swing = cross(w_b, arm)
+    u_b = (swing[0] - unseen[0], swing[1] - unseen[1], swing[2] - unseen[2])
     u = (
         C[0, 0] * u_b[0] + C[0, 1] * u_b[1] + C[0, 2] * u_b[2],
         C[1, 0] * u_b[0] + C[1, 1] * u_b[1] + C[1, 2] * u_b[2],
@@ -57,12 +80,13 @@ def velocity_row(
         z[j] -= measured[j]
 
 
-@row
-def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+@compiled
+def _shown(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, unseen: Any, H: Any, z: Any) -> None:
+    """Velocity of an antenna without what of its swing is not shown, with its slow errors."""
     arm = with_state(figures, ARM, assumed, at[AT_ARM])
     lag = lag_now(now, assumed, at[AT_LAG])
     C, w_b, push = matrix_of(now, NOW_C), vector_of(now, NOW_TURN), vector_of(now, NOW_PUSH)
-    velocity_row(now, C, w_b, push, arm, lag, at[AT_ARM], at[AT_LAG], measured, H, z)
+    velocity_row(now, C, w_b, push, arm, unseen, lag, at[AT_ARM], at[AT_LAG], measured, H, z)
     if at[AT_OWN] >= 0:
         for j in range(2):
             z[j] += assumed[at[AT_OWN] + j]
@@ -73,4 +97,25 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             H[j, at[AT_BIAS] + j] = -1.0
 
 
+@row
+def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    _shown(now, figures, at, assumed, measured, (0.0, 0.0, 0.0), H, z)
+
+
+@row
+def _smoothed(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    C, quick, unseen = matrix_of(now, NOW_C), vector_of(measured, 3), (0.0, 0.0, 0.0)
+    if at[AT_FILTER] >= 0:
+        unseen = cross(quick, vector_of(assumed, at[AT_FILTER]))
+        for j in range(3):
+            m = cross(quick, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)))
+            for i in range(3):
+                H[i, at[AT_FILTER] + j] = C[i, 0] * m[0] + C[i, 1] * m[1] + C[i, 2] * m[2]
+    _shown(now, figures, at, assumed, measured, unseen, H, z)
+
+
 VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "bias": 3, "own": 2}, swings=True)
+# As measured: velocity, and the rate of the body less its mean over what the receiver filters, rad/s, body axes.
+SMOOTHED_VELOCITY = replace(
+    VELOCITY, name="smoothed velocity", function=_smoothed, sizes={**VELOCITY.sizes, "filter": 3}, width=6
+)

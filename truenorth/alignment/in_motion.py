@@ -22,7 +22,7 @@ from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
-from truenorth.alignment.in_motion_moments import two_moments
+from truenorth.alignment.in_motion_moments import two_moments, with_swing_apart
 from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_spread import Spread
@@ -198,7 +198,7 @@ def _aligned(
             found = once_more(task, found, first)
         number += 1
     if passes > 1:
-        task, found = two_moments(task, found, first)
+        task, found = with_swing_apart(*two_moments(task, found, first), first)
     for _ in range(SLOW_PASSES if passes > 1 else 0):
         slower = task.with_slow_errors(found.track)
         if slower is task:
@@ -223,7 +223,9 @@ def _aligned(
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
-    more += learnt_evidence(task.factors, answer.moving.delays, task.scatter) if answer.moving is not None else []
+    more += (
+        [] if answer.moving is None else learnt_evidence(task.factors, answer.moving.delays, task.scatter, task.swings)
+    )
     more += task.wanders
     more += _seen(task, track, guess, first, gated=passes > 1, gyrocompassed=method == "gyrocompass")
     return judge_moving(answer, last or track, heading_limit, more)

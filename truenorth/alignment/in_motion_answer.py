@@ -17,11 +17,9 @@ from truenorth.core.earth import normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
-from truenorth.estimate.latency import delay_of
-from truenorth.quality.swing import VELOCITIES
+from truenorth.estimate.latency import delays_found
 from truenorth.records import OdometerRecord
 from truenorth.state.layout import ACCEL_AXES, ANTENNA_ARM, BA, BG, DP, GYRO_AXES, PHI
-from truenorth.state.limits import is_estimated
 from truenorth.state.track import Track
 
 
@@ -50,12 +48,7 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
     prior[3:] = np.hypot(prior[3:], np.sqrt(task.spec.acting_variance(standing())))
     groups = (GYRO_AXES, ACCEL_AXES) if task.antenna.lever_arm.any() else (GYRO_AXES, ACCEL_AXES, ANTENNA_ARM)
     moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting, groups)
-    late = {"GNSS": task.antenna, VELOCITIES: task.velocities, "odometer": task.wheel, "velocity log": task.wheel}
-    delays = {
-        name: (sensor.latency + found[0], found[1])
-        for name, sensor in late.items()
-        if sensor is not None and (found := delay_of(track, name)) is not None and is_estimated(found[1], found[2])
-    }
+    delays = delays_found(track, {"GNSS": task.antenna, "odometer": task.wheel, "velocity log": task.wheel})
     # Navigation goes on from there: what heading is less sure of belongs to it, too.
     less_sure = covariance[2, 2] - history.phi_covariance[-1][2, 2]
     if task.gnss is None and not task.more:

@@ -114,10 +114,9 @@ def _of_open_clocks(task: MovingTask, guess: Guess, track: Track, first: Guess, 
 
 def _as_stamped(task: MovingTask, track: Track) -> list[Residuals]:
     """Residuals with the stamps of their logs, which the latency of a sensor has moved."""
-    velocities = task.velocities or task.antenna
     lags = {
         "GNSS position": task.antenna.latency,
-        VELOCITIES: velocities.latency,
+        VELOCITIES: task.antenna.of_velocities.latency,
         "odometer": task.wheel.latency,
         "velocity log": task.wheel.latency,
     }

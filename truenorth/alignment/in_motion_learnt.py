@@ -11,8 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.estimate.latency import SHOWN_DELAY
+from truenorth.estimate.latency import delay_notes
 from truenorth.quality.aid_noise import LEAST_FACTOR, noise_notes
+from truenorth.quality.swing import VELOCITIES
 from truenorth.state.evidence import Evidence, note
 
 Array = NDArray[np.float64]
@@ -25,14 +26,23 @@ def differs(before: float, after: float) -> bool:
 
 
 def learnt_evidence(
-    factors: Mapping[str, Array], delays: Mapping[str, tuple[float, float]], scatter: float = 0.0
+    factors: Mapping[str, Array], delays: Mapping[str, tuple[float, float]], scatter: float, swings: float
 ) -> list[Evidence]:
-    """What was learnt, for the reader: it is in sigma already."""
+    """What was learnt, for the reader: it is in sigma already.
+
+    Parameters
+    ----------
+    factors : mapping of source to (3,) array
+        Of its noise.
+    delays : mapping of sensor to (delay, sigma), s
+    scatter : float, s
+        One sigma of the receiver's stamps.
+    swings : float, m/s
+        RMS of the antenna's swing that the receiver does not show.
+    """
     found = noise_notes(factors)
     if scatter > 0.0:
         found.append(note("noise.stamps", name="GNSS", size=scatter))
-    for name, (delay, sigma) in delays.items():
-        if abs(delay) > max(SHOWN_DELAY * sigma, 0.02):
-            late = "late" if delay > 0.0 else "early"
-            found.append(note(f"delay.{late}", name=name, size=abs(delay), sigma=sigma))
-    return found
+    if swings > 0.0:
+        found.append(note("noise.swing", name=VELOCITIES, size=swings))
+    return found + delay_notes(delays)

@@ -1,56 +1,54 @@
-"""Are a receiver's velocities of the moment of its places? What they are later by is a delay of their own.
-
-A receiver has its velocities from how the phases of carriers change from one epoch to the next, a mean over the interval: they are
-half an interval older than the places of the same stamp, .5 s at 1 Hz, or not at all where it takes the Doppler shift of the
-epoch. Of the cart of `stim300_cart_chicago` places alone are .84 s late and velocities alone 1.43 s, each to .02 s. One delay for
-both lies between the two, is known twice as well as either, and is neither.
-
-So two delays are asked for once the passes have settled. A likelihood ratio says whether there are two: the second has its own
-prior, so a sound log exceeds c in less than exp(-c / 2) of cases (Markov's inequality). Where one delay has the gate reject rows
-that two do not, the rows that both take say nothing of it, and rejected ones count as much as the gate allows. Then each delay has
-its own state in all passes.
-
-Source: NovAtel, "OEM6 Family Firmware Reference Manual" (OM-20000129), BESTVEL: latency of the velocity's time tag.
-"""
+"""Passes over the log of a receiver that filters its velocities: of another moment than its places, and without quick swings."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from truenorth.alignment.in_motion_passes import Pass, once_more
 from truenorth.alignment.in_motion_start import Guess
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.rivals import likelihood_ratio
-from truenorth.estimate.slow_fit import bounded_misfit
-from truenorth.state.limits import limit
-from truenorth.state.track import Track
+from truenorth.estimate.moments import explained_by_two, velocities_apart
 
-MOST = 6  # passes, until both delays have settled
+MOST = 6  # passes, until delays have settled
 
 
 def two_moments(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:
     """Task and last pass with a delay of the velocities alone, where the log speaks for it; else the same ones."""
-    apart = task.with_velocities_apart()
-    if apart is task:
+    antenna = velocities_apart(task.antenna, task.gnss)
+    if antenna is task.antenna:
         return task, found
+    apart = replace(task, antenna=antenna)
     try:
         track = apart.run(found.guess, gated=True)
-        if not _explains(track, found.track):
+        if not explained_by_two(track, found.track):
             return task, found
-        other = found
-        for _ in range(MOST):
-            apart, much = apart.learnt(track)
-            if not much and other.settled and other.task is not task:
-                break
-            other = once_more(apart, other, first)
-            track = other.track
+        return _settled(apart.learnt(track)[0], found, first)
     except DataError:  # the filter broke down: they are of one moment
         return task, found
-    return apart, other
 
 
-def _explains(track: Track, one: Track) -> bool:
-    """Whether two delays explain the log better than one."""
-    if likelihood_ratio(one.residuals, track.residuals) > limit("rival"):
-        return True
-    fewer = sum(r.rejected for r in track.residuals) < sum(r.rejected for r in one.residuals)
-    return fewer and bounded_misfit(one.residuals) - bounded_misfit(track.residuals) > limit("rival")
+def with_swing_apart(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:
+    """Task and last pass whose estimated arm is not learnt from the antenna's swing (:mod:`truenorth.aiding.velocity`).
+
+    The passes before have found the delays with one arm for all: where two are known to metres from the first pass on, delays that
+    are not known yet lose the filter (5 of 48 consumer IMUs under a mast of 2 m on rough ground).
+    """
+    if task.gnss is None or task.antenna.lever_arm_sigma == 0.0 or not task.gnss.has_velocity.any():
+        return task, found
+    try:
+        return _settled(replace(task, swing_apart=True), found, first)
+    except DataError:  # the filter broke down
+        return task, found
+
+
+def _settled(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:
+    """Another task than that of the last pass, and its own last one, once what passes learn has settled."""
+    last = once_more(task, found, first)
+    for _ in range(MOST - 1):
+        later, much = task.learnt(last.track)
+        if not much and last.settled:
+            break
+        task = later
+        last = once_more(task, last, first)
+    return task, last

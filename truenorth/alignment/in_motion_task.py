@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import ANTENNA, LATENCY_SIGMA, WHEEL
-from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity, states_of
+from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import differs
 from truenorth.alignment.in_motion_start import Guess, coarse_guess, start_at
@@ -23,7 +23,7 @@ from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
-from truenorth.estimate.latency import as_late_as_found, mounting_found
+from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.sensor_delay import on_springs
 from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_rest
@@ -43,13 +43,13 @@ from truenorth.quality.slow_aids import (
     with_slow,
 )
 from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
-from truenorth.quality.swing import VELOCITIES, swing, unseen_swing
+from truenorth.quality.swing import UNSEEN_ARM, VELOCITIES, swing, unseen_swing, with_unseen_arm
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specified import corrected, seen_in
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import BA
+from truenorth.state.layout import ANTENNA_ARM, BA
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -87,6 +87,7 @@ class MovingTask:
     factors: Mapping[str, Array] = field(default_factory=dict)  # of noise, as learnt from the pass before
     scatter: float = 0.0  # s, one sigma of the receiver's stamps, so learnt
     unseen: float = 0.0  # share of the antenna's swing that the receiver does not show, so learnt
+    swings: float = 0.0  # m/s, RMS over the rows of what that is
     scattered: Mapping[str, Array] = field(default_factory=dict)  # what both add to the sigmas
     waited: float = 0.0  # s, that the vehicle drove before anything aided: left out of the record
     # The slow error of fixes is the usual one, or innovations have shown it: nobody spoke of it
@@ -97,7 +98,7 @@ class MovingTask:
     steady: bool = False
     held: bool = False  # biases of the accelerometers across the vertical are taken for zero
     by_fix: bool = False  # the position is that of a fix: the IMU's but for the antenna's arm
-    velocities: Mounting | None = None  # how late those of the receiver are, where that is not how late its places are
+    swing_apart: bool = False  # an arm that is estimated is not learnt from swings, of which velocities may show a part
     sprung: bool = False  # the body goes up and down on its wheels: they do not say that it stays on the road
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
@@ -105,28 +106,30 @@ class MovingTask:
         aiding = self.aiding(gated=False)
         factors = noise_factors(track, aiding, self.factors)
         antenna = mounting_found(self.antenna, track, "GNSS")
-        velocities = None if self.velocities is None else as_late_as_found(self.velocities, track, VELOCITIES)
         scatter = stamp_scatter(track, aiding, self.scatter)
-        later = antenna is not self.antenna or velocities is not self.velocities
         arm = self._arm(track)
         given = self.antenna.latency_sigma == 0.0
         unseen = 0.0 if given else unseen_swing(track, self.record, arm, self.unseen)
         scatters = differs(self.scatter, scatter) or differs(self.unseen, unseen)
-        much = later or changed(self.factors, factors) or scatters
+        much = antenna is not self.antenna or changed(self.factors, factors) or scatters
         if not much:
             return self, False
-        added = scattered(aiding, track, scatter)
+        added, swings = scattered(aiding, track, scatter), 0.0
         for source in aiding if unseen else ():
             if source.name == VELOCITIES:
                 more = unseen * swing(track, self.record, arm, source.time)
+                swings = math.sqrt(float(np.mean(np.sum(more**2, axis=1))))
                 added[VELOCITIES] = np.hypot(added.get(VELOCITIES, 0.0), more)
-        learnt = replace(self, factors=factors, antenna=antenna, velocities=velocities)
-        return replace(learnt, scatter=scatter, unseen=unseen, scattered=added), True
+        learnt = replace(self, factors=factors, antenna=antenna, scatter=scatter, scattered=added)
+        return replace(learnt, unseen=unseen, swings=swings), True
 
     def _arm(self, track: Track) -> Array:
-        """(3,) of the antenna, as a track has found it, m."""
-        there = track.layout.slice_of("GNSS lever arm")
-        return self.antenna.lever_arm + (0.0 if there is None else track.sensors[-1, there])
+        """(3,) of the antenna, as a track has found it, m, without the part of it whose swing is found not to be shown."""
+        arm = self.antenna.lever_arm.copy()
+        for name, sign in ((ANTENNA_ARM, 1.0), (UNSEEN_ARM, -1.0)):
+            if (there := track.layout.slice_of(name)) is not None:
+                arm += sign * track.sensors[-1, there]
+        return arm
 
     def with_slow_errors(self, track: Track) -> MovingTask:
         """The task with slow errors of its aids that a pass has shown: the same one where there are none."""
@@ -140,13 +143,6 @@ class MovingTask:
             lasting=lasting,
             wanders=(*self.wanders, *wanders),
         )
-
-    def with_velocities_apart(self) -> MovingTask:
-        """The task whose receiver's velocities have a delay of their own: the same one where they have, or where it is given."""
-        both = has_fixes(self.gnss) and bool(self.gnss.has_velocity.any())
-        if not both or self.antenna.latency_sigma == 0.0 or self.velocities is not None:
-            return self
-        return replace(self, velocities=self.antenna)
 
     def with_spec(self, spec: ImuSpec) -> MovingTask:
         """The task with another specification of the IMU."""
@@ -185,18 +181,11 @@ class MovingTask:
                 from_odometer(log, wheel) if isinstance(log, OdometerRecord) else from_velocity(log, wheel, self.slow)
             )
         if self.gnss is not None:
-            found += [self._timed(source) for source in from_gnss(self.gnss, antenna)]
+            shown = from_gnss(self.gnss, antenna)
+            found += with_unseen_arm(shown, self.record) if self.swing_apart else shown
         found += [source if gated else replace(source, gate=0.0) for source in self.more]
         found = with_scatter(louder(with_slow(found, self.lasting), self.factors), self.scattered)
         return on_springs(found) if self.sprung else found
-
-    def _timed(self, source: Aiding) -> Aiding:
-        """A source of the receiver; its velocities as late as they are."""
-        if self.velocities is None or source.name != VELOCITIES:
-            return source
-        own = states_of(self.velocities, VELOCITIES, "lag")
-        time = source.time + self.antenna.latency - self.velocities.latency
-        return replace(source, time=time, states={**source.states, **own})
 
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""

@@ -134,8 +134,10 @@ class Sensors:
         from truenorth.aiding.aids import ANTENNA
         from truenorth.navigation.given import late_as_found
 
-        unsaid = ANTENNA if begin is None else late_as_found(ANTENNA, begin)
-        return replace(unsaid, **given(self, "antenna"))
+        unsaid, said = ANTENNA if begin is None else late_as_found(ANTENNA, begin), given(self, "antenna")
+        if "latency" in said:  # which is that of all that the receiver says
+            unsaid = replace(unsaid, velocities=None)
+        return replace(unsaid, **said)
 
     def wheel(self, found: Mounting | None = None) -> Mounting:
         """Of the odometer: what is said of it; for the rest, `found` is how an alignment found it; else the usual."""

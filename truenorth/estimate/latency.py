@@ -11,12 +11,16 @@ taken what it could not hold. The next pass then has a wider arm, and the delay 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import VEHICLE_ARM
+from truenorth.quality.swing import VELOCITIES
+from truenorth.state.evidence import Evidence, note
+from truenorth.state.limits import is_estimated
 from truenorth.state.mounting import LONGEST_ARM, Mounting
 from truenorth.state.track import Track
 
@@ -25,6 +29,7 @@ Array = NDArray[np.float64]
 LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
 LONG_ARM = 2.0  # sigmas of its prior, from which an arm that nobody has said shows a larger vehicle
 SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word, or a pass
+SAID_DELAY = 0.02  # s, from which it is worth a word
 
 
 def delay_of(track: Track, name: str) -> tuple[float, float, float] | None:
@@ -38,10 +43,19 @@ def delay_of(track: Track, name: str) -> tuple[float, float, float] | None:
 
 def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
     """The mounting of a sensor with the delay that a track has found; the same object where that is too short to matter."""
+    later = _more(track, name)
+    if later != 0.0:
+        mounting = replace(mounting, latency=mounting.latency + later)
+    if mounting.velocities is not None and (later := _more(track, VELOCITIES)) != 0.0:
+        own = mounting.velocities
+        mounting = replace(mounting, velocities=own._replace(latency=own.latency + later))
+    return mounting
+
+
+def _more(track: Track, name: str) -> float:
+    """By how much later (s) a sensor was found than assumed; 0 where that is too short to matter."""
     late = delay_of(track, name)
-    if late is None or abs(late[0]) <= max(LEAST_DELAY, SHOWN_DELAY * late[1]):
-        return mounting
-    return replace(mounting, latency=mounting.latency + late[0])
+    return 0.0 if late is None or abs(late[0]) <= max(LEAST_DELAY, SHOWN_DELAY * late[1]) else late[0]
 
 
 def as_long_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
@@ -61,14 +75,40 @@ def mounting_found(mounting: Mounting, track: Track, name: str) -> Mounting:
     return longer if longer is not mounting else as_late_as_found(mounting, track, name)
 
 
+def latencies(name: str, mounting: Mounting) -> dict[str, float]:
+    """How late a sensor is said to be, s, by the names of its delays; a receiver's velocities may have their own."""
+    said = {name: mounting.latency}
+    return said | {VELOCITIES: mounting.of_velocities.latency} if name == "GNSS" else said
+
+
+def delays_found(track: Track, sensors: Mapping[str, Mounting]) -> dict[str, tuple[float, float]]:
+    """Whole delays (s) and their sigmas, by name, of sensors by name: those that were left open and that the data show."""
+    return {
+        delay: (late + found[0], found[1])
+        for name, mounting in sensors.items()
+        for delay, late in latencies(name, mounting).items()
+        if (found := delay_of(track, delay)) is not None and is_estimated(found[1], found[2])
+    }
+
+
+def delay_notes(delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:
+    """How late sensors were found to be, for the reader: it is in sigma already."""
+    return [
+        note(f"delay.{'late' if delay > 0.0 else 'early'}", name=name, size=abs(delay), sigma=sigma)
+        for name, (delay, sigma) in delays.items()
+        if abs(delay) > max(SHOWN_DELAY * sigma, SAID_DELAY)
+    ]
+
+
 def counted_from(track: Track, name: str, before: float) -> Track:
     """The track with a sensor's delay counted from another latency, `before` (s) less than the one it was run with."""
     return _added(track, f"{name} lag", np.array([before]))
 
 
 def counted_whole(track: Track, name: str, mounting: Mounting) -> Track:
-    """The track with a sensor's delay and lever arm as they are, not as what they are beyond those that were said."""
-    track = counted_from(track, name, mounting.latency)
+    """The track with a sensor's delays and lever arm as they are, not as what they are beyond those that were said."""
+    for delay, late in latencies(name, mounting).items():
+        track = counted_from(track, delay, late)
     return _added(track, f"{name} lever arm", mounting.lever_arm)
 
 

@@ -130,7 +130,7 @@ def _level(source: Aiding) -> float:
 
 def _lasting(source: Aiding, white: float, size: float, time: float) -> Lasting:
     """White noise and slow error of a source, in parts of its sigma along the level; heights err more by what it says of them."""
-    there = np.isfinite(source.measured).any(axis=0)
+    there = np.isfinite(source.measured[:, : source.row.rows]).any(axis=0)
     axes = np.where(there, np.median(source.sigma, axis=0) / _level(source), LEAST)
     kind = KINDS[source.name]
     return Lasting(Group(kind.name, size * _level(source) * axes, time, unit=source.row.unit), white)

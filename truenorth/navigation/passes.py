@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
+from truenorth.core.errors import DataError
 from truenorth.errors.model import InsModel
-from truenorth.estimate.latency import counted_from
+from truenorth.estimate.latency import counted_from, delay_notes, delays_found, latencies
+from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
 from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
@@ -21,6 +23,7 @@ from truenorth.navigation.second_look import SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
+from truenorth.quality.swing import with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.state import Start
@@ -55,7 +58,7 @@ class Plan:
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
-        used = [*sensors, *self.always]
+        used = [*with_unseen_arm(sensors, self.record), *self.always]
         return navigate_track(
             self.record,
             self.start,
@@ -83,6 +86,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     if later is not given:
         given = later
         track = plan.run(plan.sources(given), smooth=smooth)
+    given, track = _of_two_moments(plan, given, track, smooth)
     for _ in range(2):  # one sensor's may hide another's
         slow, shown = slow_errors(track, plan.sources(given))
         if not slow:
@@ -98,10 +102,34 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
             track = plan.run(plan.sources(given), smooth=smooth)
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES))
+        if receiver.mounting is not None and receiver.mounting.velocities is not None:
+            said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
     for key, (name, _) in SENSORS.items():
-        if given.get(key) is not asked.get(key):
-            track = counted_from(track, name, given[key].mounting.latency - asked[key].mounting.latency)
+        if given.get(key) is asked.get(key):
+            continue
+        before = latencies(name, asked[key].mounting)
+        for delay, late in latencies(name, given[key].mounting).items():
+            track = counted_from(track, delay, late - before[delay])
     return plan, given, track, said
+
+
+def _of_two_moments(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[dict[str, Any], Track]:
+    """The aids with a delay of the receiver's velocities alone, where the log speaks for it, and the track; else the same ones."""
+    receiver = given.get(Gnss.key)
+    if not isinstance(receiver, Gnss) or receiver.mounting is None:
+        return given, track
+    antenna = velocities_apart(receiver.mounting, receiver.record)
+    if antenna is receiver.mounting:
+        return given, track
+    apart = {**given, Gnss.key: receiver.mounted(antenna)}
+    try:
+        two = plan.run(plan.sources(apart))
+        if not explained_by_two(two, track):
+            return given, track
+        apart = delayed(plan, apart, two)
+        return apart, plan.run(plan.sources(apart), smooth=smooth)
+    except DataError:  # the filter broke down: they are of one moment
+        return given, track
 
 
 def _as_noisy(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:

@@ -19,9 +19,10 @@ from truenorth.core.paths import as_path
 from truenorth.core.position import Position
 from truenorth.errors.axes import axis_sigma, standing
 from truenorth.navigation.handover import Handover
+from truenorth.quality.swing import VELOCITIES
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI, STATES
-from truenorth.state.mounting import Mounting
+from truenorth.state.mounting import Clock, Mounting
 from truenorth.state.prior import WholeBiases, positive, prior_covariance
 from truenorth.state.state import Start, State
 
@@ -181,7 +182,13 @@ def _times(known: Array, other: Array) -> Array:
 
 def _with_sensors(start: Start, summary: Mapping[str, Any]) -> Start:
     """The start with what an alignment on the move has found of its sensors: how the odometer sits, how late both are."""
-    return replace(start, wheel=_found_wheel(summary), gnss_delay=_found_delay(summary, "GNSS"))
+    own = _found_delay(summary, VELOCITIES)
+    return replace(
+        start,
+        wheel=_found_wheel(summary),
+        gnss_delay=_found_delay(summary, "GNSS"),
+        gnss_velocity_delay=None if own is None else Clock(*own),
+    )
 
 
 def _found_delay(summary: Mapping[str, Any], sensor: str) -> tuple[float, float] | None:

@@ -10,14 +10,24 @@ differences of innovations as the scatter of stamps (:mod:`truenorth.quality.sta
 receiver that shows nothing of the swing has a share of 1. One that shows that of another moment has the root of 2, both swings
 count: so nothing is learnt where a delay is given, since one that is wrong would hide in it.
 
+The share is of an arm that is known. Of one that is estimated, the part of it whose swing is not shown is estimated with it
+(:mod:`truenorth.aiding.velocity`): the swing says nothing else of it. With the share alone the arm up of a mast of 2 m came out as
+nothing, 37 to 57 of its sigmas off.
+
 The rule is ours.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.source import Aiding
+from truenorth.aiding.velocity import SMOOTHED_VELOCITY
+from truenorth.errors.group import Group
 from truenorth.quality.stamps import likelihoods, pairs
 from truenorth.quality.whiteness import FEWEST
 from truenorth.records import ImuRecord
@@ -29,6 +39,7 @@ Array = NDArray[np.float64]
 
 VELOCITIES = "GNSS velocity"
 SMOOTHED = 1.0  # s, over which a receiver takes a mean, or its interval where that is shorter
+UNSEEN_ARM = "GNSS unseen arm"  # the name of its states
 SHARES = np.concatenate([[0.0], np.geomspace(0.1, 2.0, 40)])
 
 
@@ -59,12 +70,40 @@ def swing(track: Track, record: ImuRecord, arm: Array, time: Array) -> Array:
     """(M, 3) RMS of an antenna's swing on its arm about some times, east, north, up, m/s."""
     if len(time) < 2 or not arm.any():
         return np.zeros((len(time), 3))
-    half = 0.5 * min(SMOOTHED, float(np.median(np.diff(np.sort(time)))))
     moves = np.cross(increments(record)[0] / record.steps[:, None], arm)
     squares = (moves[:, :, None] * moves[:, None, :]).reshape(-1, 9)
-    sums = np.vstack([np.zeros(12), np.cumsum(np.hstack([moves, squares]), axis=0)])
-    begin, end = (np.searchsorted(record.time, time + side) for side in (-half, half))
-    means = (sums[end] - sums[begin]) / np.maximum(end - begin, 1)[:, None]
+    means = _means(record, np.hstack([moves, squares]), time, 0.5 * _filters(time))
     covariance = means[:, 3:].reshape(-1, 3, 3) - means[:, :3, None] * means[:, None, :3]
     C = track.C_nb[np.clip(np.searchsorted(track.time, time), 0, len(track.time) - 1)]
     return np.asarray(np.sqrt(np.maximum(np.einsum("kia,kab,kib->ki", C, covariance, C), 0.0)))
+
+
+def with_unseen_arm(aiding: Iterable[Aiding], record: ImuRecord) -> list[Aiding]:
+    """The same sources; a receiver's velocities with the part of an estimated arm whose swing they do not show, among their states.
+
+    It is as long as the arm may be, along each axis.
+    """
+    return [_smoothed(s, record) if s.name == VELOCITIES and "lever arm" in s.states else s for s in aiding]
+
+
+def _smoothed(source: Aiding, record: ImuRecord) -> Aiding:
+    rates = increments(record)[0] / record.steps[:, None]
+    middle, half = record.time - 0.5 * record.steps, _filters(source.time)
+    now = np.stack([np.interp(source.time, middle, rate) for rate in rates.T], axis=1)
+    # Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
+    quick = now - _means(record, _means(record, rates, middle, half), source.time, half)
+    unseen = Group(UNSEEN_ARM, np.hypot(source.lever_arm, source.states["lever arm"].sigma), unit="m")
+    measured = np.hstack([source.measured, quick])
+    return replace(source, kind=SMOOTHED_VELOCITY, measured=measured, states={**source.states, "filter": unseen})
+
+
+def _filters(time: Array) -> float:
+    """Over how long a receiver of these times may take a mean, s."""
+    return min(SMOOTHED, float(np.median(np.diff(np.sort(time))))) if len(time) > 1 else SMOOTHED
+
+
+def _means(record: ImuRecord, values: Array, time: Array, half: float) -> Array:
+    """(M, m) of values (N, m) of a record's rows, from `half` (s) before to as much after some times."""
+    sums = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    begin, end = (np.searchsorted(record.time, time + side) for side in (-half, half))
+    return np.asarray((sums[end] - sums[begin]) / np.maximum(end - begin, 1)[:, None])

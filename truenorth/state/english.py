@@ -302,6 +302,9 @@ SENTENCES = {
         "{name}: its stamps scatter by {size:.2g} s about their delay (one sigma): what that makes of speed and acceleration is "
         "in the noise of each row"
     ),
+    "noise.swing": (
+        "{name}: its antenna swings about the IMU by {size:.2g} m/s (RMS) more than it shows: that is in the noise of each row"
+    ),
     "noise.estimated": "{name}: its noise is {factor:.2g} times as large as was said; so it is taken",
     "delay.late": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s late, which is estimated and in sigma",
     "delay.early": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s early, which is estimated and in sigma",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,13 @@ Array = NDArray[np.float64]
 SLIP_SIGMA = 0.1  # m/s, of a wheel sideways and of a body on its springs up and down
 COMPLIANCE_SIGMA = 5e-3  # rad s^2/m, 2.8 deg/g: tyres give 1 to 5 deg/g, springs 2 to 4
 LONGEST_ARM = 100.0  # m; ships have no longer ones
+
+
+class Clock(NamedTuple):
+    """How late what a sensor shows is, and how well that is known."""
+
+    latency: float  # s, by which it is older than its time stamp
+    latency_sigma: float  # s; 0: known, else it is estimated
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,9 @@ class Mounting:
         The measurement is older than its time stamp by this much.
     latency_sigma : float, s
         0: known; else the latency is estimated.
+    velocities : Clock, optional
+        How late a receiver's velocities are, where that is not how late its places are: a mean over an interval is half of it older
+        than a place of the same stamp.
     gate : float
         Probability of rejecting a sound measurement; 0: none is rejected.
     noise : float or None, m/s or m
@@ -64,10 +75,16 @@ class Mounting:
     bias_time: float = math.inf
     latency: float = 0.0
     latency_sigma: float = 0.0
+    velocities: Clock | None = None
     gate: float = limit("gate")
     noise: float | None = None
     slip: float = SLIP_SIGMA
     compliance: float = COMPLIANCE_SIGMA
+
+    @property
+    def of_velocities(self) -> Clock:
+        """How late a receiver's velocities are: as its places, where nothing else is said."""
+        return self.velocities or Clock(self.latency, self.latency_sigma)
 
     @property
     def slow(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.state.layout import STATES
-from truenorth.state.mounting import Mounting
+from truenorth.state.mounting import Clock, Mounting
 from truenorth.state.prior import WholeBiases
 
 Array = NDArray[np.float64]
@@ -59,6 +59,8 @@ class Start(State):
         How an alignment on the move found the odometer to sit and to count.
     gnss_delay : (delay, sigma) or None, s
         By which that alignment found the receiver's stamps to be late.
+    gnss_velocity_delay : Clock or None
+        By which it found those of the receiver's velocities to be late, where they have a delay of their own.
     plumb : float, rad
         One-sigma deflection of the vertical that P holds as tilt and accelerometer bias that cancel each other; 0: none.
     known : mapping of name to (m,) values
@@ -72,6 +74,7 @@ class Start(State):
     whole: WholeBiases | None = None
     wheel: Mounting | None = None
     gnss_delay: tuple[float, float] | None = None
+    gnss_velocity_delay: Clock | None = None
     plumb: float = 0.0
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=lambda: np.zeros(3))
