@@ -170,7 +170,7 @@ def _inertial_integrals(
         w.q[i, 0] = state[i]
     for i in range(6):
         w.own[i, 0] = state[10 + i]
-    j = 0
+    done = 0  # epochs
     for first in range(0, len(dtheta), ROWS):
         count = min(ROWS, len(dtheta) - first)
         small = _take_biases_off(dtheta, dvel, steps, bias, first, count, w)
@@ -179,7 +179,7 @@ def _inertial_integrals(
         for k in range(count):
             f = rotate((w.q[0, k], w.q[1, k], w.q[2, k], w.q[3, k]), (w.gain[0, k], w.gain[1, k], w.gain[2, k]))
             w.gain[0, k], w.gain[1, k], w.gain[2, k] = f
-        j = _add_up(steps, epochs, first, count, w, state, j, out)
+        done = _add_up(steps, epochs, first, count, w, state, done, out)
         q = normalised((w.q[0, count], w.q[1, count], w.q[2, count], w.q[3, count]))
         w.q[0, 0], w.q[1, 0], w.q[2, 0], w.q[3, 0] = q
         for i in range(6):
@@ -188,7 +188,7 @@ def _inertial_integrals(
         state[i] = w.q[i, 0]
     for i in range(6):
         state[10 + i] = w.own[i, 0]
-    for m in range(j, len(epochs)):
+    for m in range(done, len(epochs)):
         for i in range(10):
             out[m, i] = state[i]
 
@@ -242,13 +242,13 @@ def _turn(count: int, w: _Rows) -> None:
 
 
 @borrowing(forceinline=True)
-def _add_up(steps: Any, epochs: Any, first: int, count: int, w: _Rows, state: Any, j: int, out: Any) -> int:
-    """Velocity and position behind each row, and what is put out on the way: the number of epochs behind which rows follow."""
+def _add_up(steps: Any, epochs: Any, first: int, count: int, w: _Rows, state: Any, done: int, out: Any) -> int:
+    """Velocity and position behind each row, and what is put out on the way: how many epochs are done."""
     vx, vy, vz, px, py, pz = state[4], state[5], state[6], state[7], state[8], state[9]
     fx, fy, fz = state[16], state[17], state[18]  # of the row before
     if math.isnan(fx):
         fx, fy, fz = w.gain[0, 0], w.gain[1, 0], w.gain[2, 0]
-    k = 0
+    j, k = done, 0
     while k < count:
         while j < len(epochs) and epochs[j] == first + k:
             out[j, 0], out[j, 1], out[j, 2], out[j, 3] = w.q[0, k], w.q[1, k], w.q[2, k], w.q[3, k]
