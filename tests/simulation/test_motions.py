@@ -11,6 +11,7 @@ from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.simulation import Disturbed, Motion, Sway, Tone, rest
 from truenorth.simulation.course import Leg, course, ring
+from truenorth.simulation.ideal import ideal_log
 from truenorth.simulation.manoeuvres import accelerate, climb, s_turn, straight, turn, wing_rock
 from truenorth.simulation.profile import Ramp, profile, pulse
 from truenorth.simulation.route import Driving, route
@@ -64,6 +65,17 @@ def test_an_ideal_imu_comes_back_from_every_smooth_motion(name):
     assert np.degrees(np.max(np.abs(turned))) * 3600 < 0.05
     assert np.max(np.abs(v)) < 1e-4
     assert np.max(np.abs(moved)) < 1e-2
+
+
+def test_a_base_at_rest_senses_one_rate_all_along():
+    """A tone too small for a digit takes the long way, by quadrature."""
+    quick, slow = (
+        ideal_log(Sway(PLACE, 0.7, 0.1, -0.2, lever_arm=(1.0, 2.0, 3.0), roll_tones=tones), rate=100.0, duration=20.0)
+        for tones in ((), (Tone(1e-300, 5.0),))
+    )
+    np.testing.assert_allclose(quick.dtheta, slow.dtheta, rtol=1e-12)
+    np.testing.assert_allclose(quick.dvel, slow.dvel, rtol=1e-12)
+    np.testing.assert_allclose(quick.leverage, slow.leverage, rtol=1e-9, atol=1e-20)
 
 
 def test_a_cone_leaves_what_coning_theory_says_and_falls_with_the_rate():

@@ -28,6 +28,7 @@ from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.staying import BA, BG, PHI
 from truenorth.filters.gains import times
 from truenorth.quality.regimes import KINDS
+from truenorth.quality.signals import median_of_rows
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit, may_be_chance
@@ -223,8 +224,8 @@ def tilted(task: Task, C_nb: Array) -> tuple[Array, Array]:
     level = np.stack([-angle[:, 1], angle[:, 0]], axis=1)
     tilt = level[: count * DRIFT_BLOCK].reshape(count, DRIFT_BLOCK, 2).mean(axis=1)
     d = np.diff(tilt, axis=0)
-    steady = np.median(d, axis=0)
-    scatter = np.median(np.abs(d - steady), axis=0) / 0.6745
+    steady = median_of_rows(d.T)[:, 0]
+    scatter = median_of_rows(np.abs(d - steady).T)[:, 0] / 0.6745
     # A median of normal values scatters by sqrt(pi/2) times what their mean does.
     sigma = scatter * math.sqrt(0.5 * math.pi / len(d)) / DRIFT_BLOCK
     return tilt - np.outer(np.arange(count), steady), sigma

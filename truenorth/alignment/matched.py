@@ -180,6 +180,7 @@ class _Together(NamedTuple):
     measured_course: Array
 
 
+MOST_JOINED = 4  # forms of the measurement and lengths of logs, by turns
 _JOINED: dict[tuple[int, ...], tuple[tuple[Signatures, ...], _Together]] = {}
 
 
@@ -200,7 +201,8 @@ def _together(banks: tuple[Signatures, ...]) -> _Together:
         )
         measured_course = np.ascontiguousarray(np.concatenate([bank.measured_course for bank in banks], axis=2))
         found = _Together(epoch, at.astype(np.int64), behind, state, measured, after, state_course, measured_course)
-        _JOINED.clear()
+        if len(_JOINED) == MOST_JOINED:
+            _JOINED.clear()
         _JOINED[key] = banks, found  # that the banks are held keeps their numbers their own
     return _JOINED[key][1]
 

@@ -16,6 +16,7 @@ from truenorth.coarse.analytic import BLOCKS, Means, means, scatter_of
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.remembered import remembered
 from truenorth.quality.regimes import MotionSummary
+from truenorth.quality.signals import median_of_rows
 from truenorth.records import ImuRecord
 from truenorth.records.vibration import cone_drift
 
@@ -38,8 +39,8 @@ def passing_turns(motion: MotionSummary) -> NDArray[np.bool_]:
     rests = motion.overall in ("still", "disturbed") and motion.still_fraction > 1.0 - MOSTLY
     if not rests or len(rate) < 2 * REST + 1:
         return none
-    noise = np.median(np.abs(np.diff(rate, axis=0)), axis=0) / 0.6745 / np.sqrt(2.0)
-    turns = np.any(np.abs(rate - np.median(rate, axis=0)) > SHARED + FAR * noise, axis=1)
+    noise = median_of_rows(np.abs(rate[1:] - rate[:-1]).T)[:, 0] / 0.6745 / np.sqrt(2.0)
+    turns = np.any(np.abs(rate - median_of_rows(rate.T)[:, 0]) > SHARED + FAR * noise, axis=1)
     if not turns.any() or turns.mean() > MOSTLY:
         return none
     turns = np.convolve(turns, np.ones(2 * EDGE + 1), "same") > 0.0

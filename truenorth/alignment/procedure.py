@@ -160,7 +160,7 @@ def align_base(
     elif chosen == "analytic":
         found = _Found(*from_means(task, spec))
     else:
-        found = _align_inertial(task, spec, chosen, sound)
+        found = _align_inertial(task, spec, chosen, means, sound)
         if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit):
             chosen, why, found = "analytic", NO_NORTH, _Found(*level_from_means(task, spec))
         elif method == "auto" and spec is None and was_blind(task, found.answer.imu):
@@ -255,7 +255,7 @@ def _moves_on(task: Task, fine: FineAlignment) -> Array:
     return np.minimum(moved, limit("fastest base"))
 
 
-def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) -> _Found:
+def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogCheck, sound: bool) -> _Found:
     lat, alt = task.position.lat, task.position.alt
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
@@ -275,7 +275,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
     known = StaticModel.of(spec) if spec is not None else usual if brief else None
     filtered, noise = check_filter(task, integrals, coarse.C_n0_i, usual, known)
-    check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
+    check = sharper(filtered, means, task.motion)
     turns = task.motion.fraction("rotating") > 0.0
     used, where = specification(spec, check, lambda: turning_noise(task.record) if turns else noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)

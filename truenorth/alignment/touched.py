@@ -87,7 +87,7 @@ def find_touch(
     before = (sums[ASIDE:] - sums[:-ASIDE])[: -ASIDE - GAP] / ASIDE
     after = (sums[ASIDE:] - sums[:-ASIDE])[ASIDE + GAP :] / ASIDE
     steps = after - before
-    steps -= np.median(steps, axis=0)
+    steps -= median_of_rows(steps.T)[:, 0]
     size = np.hypot(steps[:, 0], steps[:, 1])
     # Neighbouring blocks tell what is usual: a step is in few of their differences, and the median does not see it.
     usual = median_of_rows(np.abs(blocks[1:] - blocks[:-1]).T)[:, 0] / 0.6745 / math.sqrt(ASIDE)

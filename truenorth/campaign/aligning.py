@@ -163,8 +163,9 @@ def _errors(answer: Alignment, simulated: Simulation, true: MotionStates) -> Ite
         ("gyro_bias", answer.gyro_bias, answer.gyro_bias_sigma, simulated.errors.gyro_bias, "deg/h", DEG_PER_HOUR),
         ("accel_bias", answer.accel_bias, answer.accel_bias_sigma, simulated.errors.accel_bias, "ug", MICRO_G),
     ):
-        for axis, letter in enumerate("xyz"):
-            yield f"{what}_{letter}", float(found[axis] - drawn[axis]) / scale, float(spread[axis]) / scale, unit
+        off, sigmas = ((found - drawn) / scale).tolist(), (spread / scale).tolist()
+        for letter, error, one in zip("xyz", off, sigmas, strict=True):
+            yield f"{what}_{letter}", error, one, unit
 
 
 def _failure(case: Case, method: str, run: int, time: float, error: Exception) -> Row:

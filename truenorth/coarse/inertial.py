@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.coarse.wahba import davenport_matrices, error_gain, rotation_from_davenport, triad
+from truenorth.coarse.wahba import davenport_matrices, davenport_of, error_gain, rotation_from_davenport, triad
 from truenorth.core.attitude import skew
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, gravity_velocity
 
@@ -100,8 +100,8 @@ def oba(
     starts = ends // 2
     db, dr = b[1:] - b[starts], r[1:] - r[starts]
     weights = np.ones(len(ends))
-    each = davenport_matrices(db, dr, weights)
-    found = rotation_from_davenport(np.cumsum(each, axis=0) if history else each.sum(axis=0, keepdims=True))
+    K = np.cumsum(davenport_matrices(db, dr, weights), axis=0) if history else davenport_of(dr.T @ db)[None]
+    found = rotation_from_davenport(K)
     if not gains:
         return _as_coarse(found[-1], np.zeros((0, 3, 3)), form)
     pair_gain = error_gain(dr, weights)
@@ -127,7 +127,7 @@ def estimate_latitude(integrals: InertialIntegrals, alt: float = 0.0) -> float:
         r = _half_intervals(-gravity_velocity(integrals.time, lat, alt))
         r = r / np.linalg.norm(r, axis=1, keepdims=True)
         # Wahba's loss of unit vectors is 2 (J - lambda_max), and lambda_max the largest eigenvalue of K.
-        return float(len(b) - np.linalg.eigvalsh(davenport_matrices(b, r, np.ones(len(b))).sum(axis=0))[-1])
+        return float(len(b) - np.linalg.eigvalsh(davenport_of(r.T @ b))[-1])
 
     grid = np.arange(-np.pi / 2 + SEARCH_STEP, np.pi / 2, SEARCH_STEP)
     best = grid[int(np.argmin([loss(lat) for lat in grid]))]

@@ -45,14 +45,18 @@ def davenport_matrices(b: Array, r: Array, weights: Array) -> Array:
 
     ``w_j |r_j - C b_j|^2 = w_j (|r_j|^2 + |b_j|^2) - 2 q' K_j q``.
     """
-    B = weights[:, None, None] * r[:, :, None] * b[:, None, :]  # r b'
-    trace = np.trace(B, axis1=1, axis2=2)
-    K = np.empty((len(b), 4, 4))
-    K[:, 0, 0] = trace
-    z = np.stack([B[:, 2, 1] - B[:, 1, 2], B[:, 0, 2] - B[:, 2, 0], B[:, 1, 0] - B[:, 0, 1]], -1)
-    K[:, 0, 1:] = z
-    K[:, 1:, 0] = z
-    K[:, 1:, 1:] = B + np.swapaxes(B, 1, 2) - trace[:, None, None] * np.eye(3)
+    return davenport_of(weights[:, None, None] * r[:, :, None] * b[:, None, :])
+
+
+def davenport_of(B: Array) -> Array:
+    """K matrices (..., 4, 4) of ``B = sum w_j r_j b_j'`` (..., 3, 3), in which they are linear."""
+    trace = np.trace(B, axis1=-2, axis2=-1)
+    K = np.empty((*B.shape[:-2], 4, 4))
+    K[..., 0, 0] = trace
+    z = np.stack([B[..., 2, 1] - B[..., 1, 2], B[..., 0, 2] - B[..., 2, 0], B[..., 1, 0] - B[..., 0, 1]], -1)
+    K[..., 0, 1:] = z
+    K[..., 1:, 0] = z
+    K[..., 1:, 1:] = B + np.swapaxes(B, -1, -2) - trace[..., None, None] * np.eye(3)
     return K
 
 
@@ -69,8 +73,8 @@ def q_method(b: Array, r: Array, weights: Array | None = None) -> Array:
     -------
     (3, 3) array
     """
-    w = np.ones(len(b)) if weights is None else np.asarray(weights, dtype=np.float64)
-    return rotation_from_davenport(davenport_matrices(b, r, w).sum(axis=0))
+    weighted = r if weights is None else r * np.asarray(weights, dtype=np.float64)[:, None]
+    return rotation_from_davenport(davenport_of(weighted.T @ b))
 
 
 def rotation_from_davenport(K: Array) -> Array:

@@ -261,12 +261,19 @@ def quaternion_from_rotation_vector(rotation: Any) -> Any:
     x, y, z = rotation
     square = x * x + y * y + z * z
     if square < SMALL_ANGLE_SQUARED:
-        w = 1.0 - 0.125 * square * (1.0 - (1.0 / 48.0) * square)
-        s = 0.5 - (1.0 / 48.0) * square * (1.0 - (1.0 / 80.0) * square)
-    else:
-        angle = math.sqrt(square)
-        w = math.cos(0.5 * angle)
-        s = math.sin(0.5 * angle) / angle
+        return quaternion_of_small(rotation)
+    angle = math.sqrt(square)
+    s = math.sin(0.5 * angle) / angle
+    return math.cos(0.5 * angle), s * x, s * y, s * z
+
+
+@borrowing(forceinline=True)
+def quaternion_of_small(rotation: Any) -> Any:
+    """The same of a rotation below .01 rad, by series: without a choice, so that a loop over many goes in vectors."""
+    x, y, z = rotation
+    square = x * x + y * y + z * z
+    w = 1.0 - 0.125 * square * (1.0 - (1.0 / 48.0) * square)
+    s = 0.5 - (1.0 / 48.0) * square * (1.0 - (1.0 / 80.0) * square)
     return w, s * x, s * y, s * z
 
 

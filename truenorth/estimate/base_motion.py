@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -44,58 +45,63 @@ def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, 
 
 def _variance_of(innovation: Array, covariance: Array, R: Array, colour: bool) -> tuple[Array, Array]:
     """:func:`base_variance` of innovations (K, 3) and their covariances (K, 3, 3)."""
-    skip = min(5, len(innovation) // 5)
-    count = len(innovation) - skip
-    ratio, weighted, weights, low = np.zeros((4, 3))
-    _sums_of(innovation, covariance, skip, COLOUR_BLOCK, ratio, weighted, weights, low)
-    ratio, mean = ratio / count, weighted / weights
-    # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
-    # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
-    blocks = count // COLOUR_BLOCK
-    if colour and blocks >= COLOUR_RUNS:
-        low = low / blocks / COLOUR_BLOCK
-        # What white noise itself may give: Wilson and Hilferty's limit of chi-square over its freedom, 1 % at 5 blocks.
-        chance = (1.0 - 2.0 / (9.0 * blocks) + COLOUR_ALARM * np.sqrt(2.0 / (9.0 * blocks))) ** 3
-        # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
-        coloured = low > chance * ratio
-        ratio = np.where(coloured, np.where(low > chance, np.maximum(low, ratio), np.maximum(ratio, 1.0)), ratio)
-    return np.maximum(R + (ratio - 1.0) * mean, QUIETEST_BASE**2), mean
+    asked, expected = np.empty((2, 3))
+    _ask(innovation, covariance, R, colour, asked, expected)
+    return asked, expected
 
 
 @compiled
-def _sums_of(
-    innovation: Any, covariance: Any, skip: int, length: int, squares: Any, weighted: Any, weights: Any, low: Any
-) -> None:
-    """Of each axis, from row `skip` on: squares of innovations in their variances, these weighted, weights, squares of sums."""
+def _ask(innovation: Any, covariance: Any, R: Any, colour: bool, asked: Any, expected: Any) -> None:
+    """:func:`base_variance`, axis by axis."""
+    skip = min(5, len(innovation) // 5)
     count = len(innovation) - skip
-    for i in range(len(squares)):
+    blocks = count // COLOUR_BLOCK
+    colour = colour and blocks >= COLOUR_RUNS
+    # What white noise itself may give: Wilson and Hilferty's limit of chi-square over its freedom, 1 % at 5 blocks.
+    freedom = 2.0 / (9.0 * max(blocks, 1))
+    chance = (1.0 - freedom + COLOUR_ALARM * np.sqrt(freedom)) ** 3
+    for i in range(len(R)):
+        squares, weighted, weights, low = 0.0, 0.0, 0.0, 0.0
         whole, total = 0, 0.0
-        for k in range(count):
-            nu, variance = innovation[skip + k, i], covariance[skip + k, i, i]
-            squares[i] += nu * nu / variance
-            weighted[i] += 1.0 / variance
-            weights[i] += 1.0 / variance**2
+        for k in range(skip, len(innovation)):
+            nu, variance = innovation[k, i], covariance[k, i, i]
+            squares += nu * nu / variance
+            weighted += 1.0 / variance
+            weights += 1.0 / variance**2
             total += nu / np.sqrt(variance)
             whole += 1
-            if whole == length:
-                low[i] += total * total
+            if whole == COLOUR_BLOCK:
+                low += total * total
                 whole, total = 0, 0.0
+        ratio = squares / count
+        # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
+        # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
+        low = low / max(blocks, 1) / COLOUR_BLOCK
+        # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
+        if colour and low > chance * ratio:
+            ratio = max(ratio, low if low > chance else 1.0)
+        expected[i] = weighted / weights
+        asked[i] = np.maximum(R[i] + (ratio - 1.0) * expected[i], QUIETEST_BASE**2)
 
 
 class _Bracket:
     """Variances that were too small and too large: a step that leaves them goes to their geometric middle, and not round."""
 
     def __init__(self) -> None:
-        self.small, self.large = np.zeros(3), np.full(3, np.inf)
+        self.small, self.large = [0.0] * 3, [math.inf] * 3
 
     def within(self, before: Array, asked: Array) -> Array:
         """Where to go from a variance, (3,) each, of which another one is asked for."""
-        grows = asked > before
-        self.small = np.where(grows, np.maximum(self.small, before), self.small)
-        self.large = np.where(grows, self.large, np.minimum(self.large, before))
-        closed = (self.small > 0.0) & np.isfinite(self.large) & (self.small < self.large)
-        middle = np.sqrt(np.where(closed, self.small * self.large, 1.0))
-        return np.where(closed & ((asked >= self.large) | (asked <= self.small)), middle, asked)
+        return np.array([self._of_axis(i, *pair) for i, pair in enumerate(zip(before.tolist(), asked.tolist()))])
+
+    def _of_axis(self, i: int, before: float, asked: float) -> float:
+        if asked > before:
+            self.small[i] = max(self.small[i], before)
+        else:
+            self.large[i] = min(self.large[i], before)
+        small, large = self.small[i], self.large[i]
+        closed = 0.0 < small < large < math.inf
+        return math.sqrt(small * large) if closed and (asked >= large or asked <= small) else asked
 
 
 class VelocityNoise:

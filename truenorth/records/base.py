@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -242,8 +243,9 @@ def _own(given: Any, name: str, source: str) -> Array:
         No numbers.
     """
     values: Any = given
-    if isinstance(given, np.ma.MaskedArray) and given.dtype.kind in "fiu":
-        values = np.ma.filled(given.astype(np.float64), np.nan)
+    masked = sys.modules.get("numpy.ma")  # where nobody has loaded it there are no masked arrays
+    if masked is not None and isinstance(given, masked.MaskedArray) and given.dtype.kind in "fiu":
+        values = masked.filled(given.astype(np.float64), np.nan)
     kind = getattr(getattr(values, "dtype", None), "kind", "")
     if kind in "mM" and kind:
         if name != "time" or np.isnat(values).any():

@@ -45,6 +45,8 @@ def acceleration_gain(at: MotionStates) -> Array:
 
 def integrals(moving: Moving, edges: Array, rates: Callable[[MotionStates], Array], columns: int) -> Array:
     """Integrals between successive `edges` (N+1,) of the (..., columns) values that `rates` takes from the states, (N, columns)."""
+    if getattr(moving, "at_rest", False):  # one rate for all of the log; most motions do not say
+        return np.diff(edges)[:, None] * rates(moving.states(edges[:1]))
     corners = moving.breaks
     inside = corners[(corners > edges[0]) & (corners < edges[-1])]
     parts = math.ceil(8 * float(np.max(np.diff(edges))) / moving.shortest_period)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,6 +58,11 @@ class Sway(_Tones, Motion):
         """Of all tones, s."""
         turns = (self.heading_tones, self.pitch_tones, self.roll_tones)
         return shortest(*turns, self.east_tones, self.north_tones, self.up_tones)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it has no tones."""
+        return math.isinf(self.shortest_period)
 
     def kinematics(self, t: Array) -> Kinematics:
         """Mean attitude and place, and the tones about them."""

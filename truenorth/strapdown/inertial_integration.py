@@ -7,24 +7,35 @@ design", J. Guid. Control Dyn. 21 (1998), parts 1 and 2.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import (
+    SMALL_ANGLE_SQUARED,
     normalised,
     quaternion_from_rotation_vector,
+    quaternion_of_small,
     quaternion_product,
     rotate,
 )
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
-from truenorth.strapdown.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
+from truenorth.strapdown.coning import (
+    Algorithm,
+    coefficients,
+    rotation_vector,
+    update_sums,
+    velocity_increment,
+    velocity_of_small,
+)
 from truenorth.strapdown.increments import read_only
 
 Array = NDArray[np.float64]
 END = 1.0 / 12.0  # of Euler and Maclaurin's end correction
+ROWS = 64  # worked on at once
+SURELY_SMALL = 0.9 * SMALL_ANGLE_SQUARED  # rad^2: coning adds less to the angle of a row
 
 
 def integrate_attitude(dtheta: ArrayLike, q0: ArrayLike | None = None, algorithm: Algorithm = "previous") -> Array:
@@ -140,45 +151,124 @@ def go_on(dtheta: Array, dvel: Array, steps: Array, epochs: Array, bias: Array, 
     _inertial_integrals(read_only(dtheta), read_only(dvel), read_only(steps), epochs, bias, k_before, state, out)
 
 
+class _Rows(NamedTuple):
+    """Rows that are worked on together, a column each; column 0 of those with one more is the row before."""
+
+    own: Array  # (6, ROWS + 1): increments of angle and velocity without their biases
+    turn: Array  # (4, ROWS): quaternion by which a row turns
+    gain: Array  # (3, ROWS): velocity increment of a row, in the body before it, then in ``i``
+    q: Array  # (4, ROWS + 1): attitude behind a row
+
+
 @compiled
 def _inertial_integrals(
     dtheta: Any, dvel: Any, steps: Any, epochs: Any, bias: Any, k_before: float, state: Any, out: Any
 ) -> None:
-    q = (state[0], state[1], state[2], state[3])
+    """So many rows at once that what does not wait for the row before goes in vectors; attitude is made unit behind them."""
+    w = _Rows(np.empty((6, ROWS + 1)), np.empty((4, ROWS)), np.empty((3, ROWS)), np.empty((4, ROWS + 1)))
+    for i in range(4):
+        w.q[i, 0] = state[i]
+    for i in range(6):
+        w.own[i, 0] = state[10 + i]
+    done = 0  # epochs
+    for first in range(0, len(dtheta), ROWS):
+        count = min(ROWS, len(dtheta) - first)
+        small = _take_biases_off(dtheta, dvel, steps, bias, first, count, w)
+        _in_the_body(k_before, small, count, w)
+        _turn(count, w)
+        for k in range(count):
+            f = rotate((w.q[0, k], w.q[1, k], w.q[2, k], w.q[3, k]), (w.gain[0, k], w.gain[1, k], w.gain[2, k]))
+            w.gain[0, k], w.gain[1, k], w.gain[2, k] = f
+        done = _add_up(steps, epochs, first, count, w, state, done, out)
+        q = normalised((w.q[0, count], w.q[1, count], w.q[2, count], w.q[3, count]))
+        w.q[0, 0], w.q[1, 0], w.q[2, 0], w.q[3, 0] = q
+        for i in range(6):
+            w.own[i, 0] = w.own[i, count]
+    for i in range(4):
+        state[i] = w.q[i, 0]
+    for i in range(6):
+        state[10 + i] = w.own[i, 0]
+    for m in range(done, len(epochs)):
+        for i in range(10):
+            out[m, i] = state[i]
+
+
+@borrowing(forceinline=True)
+def _take_biases_off(dtheta: Any, dvel: Any, steps: Any, bias: Any, first: int, count: int, w: _Rows) -> bool:
+    """Increments of rows from the first on, by columns; whether all turn by less than the series are good for."""
+    large = False
+    for k in range(count):
+        T = steps[first + k]
+        for i in range(3):
+            w.own[i, k + 1] = dtheta[first + k, i] - T * bias[i]
+            w.own[3 + i, k + 1] = dvel[first + k, i] - T * bias[3 + i]
+        large |= w.own[0, k + 1] ** 2 + w.own[1, k + 1] ** 2 + w.own[2, k + 1] ** 2 > SURELY_SMALL
+    return not large
+
+
+@borrowing(forceinline=True)
+def _in_the_body(k_before: float, small: bool, count: int, w: _Rows) -> None:
+    """What each row turns by, and its velocity increment, in the body before it."""
+    if small:
+        for k in range(count):
+            K, L, a, b = _sums(k_before, k, w)
+            w.gain[0, k], w.gain[1, k], w.gain[2, k] = velocity_of_small(K, a, a, L, b, b)
+            turn = quaternion_of_small(rotation_vector(K, a, a))
+            w.turn[0, k], w.turn[1, k], w.turn[2, k], w.turn[3, k] = turn
+        return
+    for k in range(count):
+        K, L, a, b = _sums(k_before, k, w)
+        w.gain[0, k], w.gain[1, k], w.gain[2, k] = velocity_increment(K, a, a, L, b, b)
+        turn = quaternion_from_rotation_vector(rotation_vector(K, a, a))
+        w.turn[0, k], w.turn[1, k], w.turn[2, k], w.turn[3, k] = turn
+
+
+@borrowing(forceinline=True)
+def _sums(k_before: float, k: int, w: _Rows) -> Any:
+    """``K, L, a, b`` of an update of one row, see :mod:`truenorth.strapdown.coning`."""
+    K = (k_before * w.own[0, k], k_before * w.own[1, k], k_before * w.own[2, k])
+    L = (k_before * w.own[3, k], k_before * w.own[4, k], k_before * w.own[5, k])
+    a = (w.own[0, k + 1], w.own[1, k + 1], w.own[2, k + 1])
+    return K, L, a, (w.own[3, k + 1], w.own[4, k + 1], w.own[5, k + 1])
+
+
+@borrowing(forceinline=True)
+def _turn(count: int, w: _Rows) -> None:
+    """Attitude behind each row: by rounding it leaves the unit by 1e-16 a row."""
+    q = (w.q[0, 0], w.q[1, 0], w.q[2, 0], w.q[3, 0])
+    for k in range(count):
+        q = quaternion_product(q, (w.turn[0, k], w.turn[1, k], w.turn[2, k], w.turn[3, k]))
+        w.q[0, k + 1], w.q[1, k + 1], w.q[2, k + 1], w.q[3, k + 1] = q
+
+
+@borrowing(forceinline=True)
+def _add_up(steps: Any, epochs: Any, first: int, count: int, w: _Rows, state: Any, done: int, out: Any) -> int:
+    """Velocity and position behind each row, and what is put out on the way: how many epochs are done."""
     vx, vy, vz, px, py, pz = state[4], state[5], state[6], state[7], state[8], state[9]
-    a, b = (state[10], state[11], state[12]), (state[13], state[14], state[15])
-    before = (state[16], state[17], state[18])
-    row = 0
-    for j in range(len(epochs) + 1):
-        end = epochs[j] if j < len(epochs) else len(dtheta)
-        while row < end:
-            T = steps[row]
-            K = (k_before * a[0], k_before * a[1], k_before * a[2])
-            L = (k_before * b[0], k_before * b[1], k_before * b[2])
-            a = (dtheta[row, 0] - T * bias[0], dtheta[row, 1] - T * bias[1], dtheta[row, 2] - T * bias[2])
-            b = (dvel[row, 0] - T * bias[3], dvel[row, 1] - T * bias[4], dvel[row, 2] - T * bias[5])
-            f = rotate(q, velocity_increment(K, a, a, L, b, b))
-            if math.isnan(before[0]):
-                before = f
-            px += (vx + 0.5 * f[0] - END * (f[0] - before[0])) * T
-            py += (vy + 0.5 * f[1] - END * (f[1] - before[1])) * T
-            pz += (vz + 0.5 * f[2] - END * (f[2] - before[2])) * T
-            before = f
-            vx += f[0]
-            vy += f[1]
-            vz += f[2]
-            phi = rotation_vector(K, a, a)
-            q = normalised(quaternion_product(q, quaternion_from_rotation_vector(phi)))
-            row += 1
-        if j < len(epochs):
-            out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q
+    fx, fy, fz = state[16], state[17], state[18]  # of the row before
+    if math.isnan(fx):
+        fx, fy, fz = w.gain[0, 0], w.gain[1, 0], w.gain[2, 0]
+    j, k = done, 0
+    while k < count:
+        while j < len(epochs) and epochs[j] == first + k:
+            out[j, 0], out[j, 1], out[j, 2], out[j, 3] = w.q[0, k], w.q[1, k], w.q[2, k], w.q[3, k]
             out[j, 4], out[j, 5], out[j, 6] = vx, vy, vz
             out[j, 7], out[j, 8], out[j, 9] = px, py, pz
-    state[0], state[1], state[2], state[3] = q
+            j += 1
+        end = min(epochs[j] - first, count) if j < len(epochs) else count
+        for r in range(k, end):
+            T, x, y, z = steps[first + r], w.gain[0, r], w.gain[1, r], w.gain[2, r]
+            px += (vx + 0.5 * x - END * (x - fx)) * T
+            py += (vy + 0.5 * y - END * (y - fy)) * T
+            pz += (vz + 0.5 * z - END * (z - fz)) * T
+            fx, fy, fz = x, y, z
+            vx += x
+            vy += y
+            vz += z
+        k = end
     state[4], state[5], state[6], state[7], state[8], state[9] = vx, vy, vz, px, py, pz
-    state[10], state[11], state[12] = a
-    state[13], state[14], state[15] = b
-    state[16], state[17], state[18] = before
+    state[16], state[17], state[18] = fx, fy, fz
+    return j
 
 
 @compiled
