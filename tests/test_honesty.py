@@ -1,6 +1,7 @@
 """The matrix of mismatch: its marks, and (slow) every case of it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,6 +37,12 @@ def test_marks():
     assert one.mark == "ok"  # by chance of twenty runs
     assert "| drawn | errors | 20 | heading 1.10 | 0 | 2.0 | ok |" in as_markdown([one])
     assert math.isfinite(one.seconds)
+    assert Line(drawn(1.0), 8, {"heading": 1.1}, ("no",), 2.0, 0, 0.1).mark == "ok"  # one may be chance
+    assert Line(drawn(1.0), 8, {"heading": 1.1}, ("no", "no"), 2.0, 0, 0.1).mark == "refused"
+    to_flag = replace(drawn(1.0), flagged=True)
+    assert Line(to_flag, 8, {"heading": 1.1}, ("no",) * 8, 0.0, 0, 0.1).mark == "flagged"
+    assert Line(to_flag, 8, {"heading": 1.1}, ("no",) * 7, 4.2, 0, 0.1).mark == "defect"
+    assert Line(to_flag, 8, {"heading": 2.9}, (), 3.9, 0, 0.1).mark == "small"
 
 
 def test_every_case_has_a_name_of_its_own():
@@ -50,4 +57,4 @@ def test_sigma_is_honest(case):
     """No run beyond four sigmas with a good status, no sigma that is too small, few refusals; eight worlds each."""
     line = run_case(case, 7, RUNS)
     print(as_markdown([line]).splitlines()[-1])  # shown with -rP
-    assert line.mark in ("ok", "large"), line.cells()
+    assert line.mark in ("ok", "large", "flagged"), line.cells()

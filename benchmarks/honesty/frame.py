@@ -41,6 +41,7 @@ class Case:
     name: str
     run: Callable[[int, int], Outcome]  # of seed and number
     left_out: bool = False  # the model leaves the error out on purpose, to show what that costs
+    flagged: bool = False  # no model holds this world: a flag is right, an answer that claims too much is not
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,8 @@ class Line:
     def mark(self) -> str:
         """What is wrong with it.
 
-        ``ok``; ``left out`` on purpose; ``defect``: beyond four sigmas with a good status; ``refused``: more than a tenth;
-        ``small`` and ``large``: sigma.
+        ``ok``; ``left out`` on purpose; ``defect``: beyond four sigmas with a good status; ``flagged``: as is right; ``refused``:
+        more than a tenth, and more than one, which may be chance; ``small`` and ``large``: sigma.
         """
         if self.case.left_out:
             return "left out"
@@ -68,7 +69,9 @@ class Line:
         room = 3.0 / math.sqrt(2.0 * max(self.runs, 1))
         if self.worst > DEFECT:
             return "defect"
-        if len(self.refused) > 0.1 * self.runs:
+        if self.case.flagged and self.refused:
+            return "flagged"
+        if len(self.refused) > max(0.1 * self.runs, 1.0):
             return "refused"
         if any(value > max(HONEST[1], 1.0 + room) for value in self.rms.values()):
             return "small"
@@ -79,8 +82,8 @@ class Line:
     def cells(self) -> list[str]:
         """Of the table."""
         rms = ", ".join(f"{name} {value:.2f}" for name, value in self.rms.items())
-        if not rms and not self.refused:  # of a case whose flags count as right
-            rms = "none: each run was flagged, as it may be"
+        if not rms:
+            rms = "none: each run was flagged"
         worst = f"{self.worst:.1f}" if self.worst else ""
         return [self.case.procedure, self.case.name, str(self.runs), rms, str(len(self.refused)), worst, self.mark]
 

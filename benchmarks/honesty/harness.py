@@ -51,6 +51,7 @@ class Case:
     good: Sequence[str] = ("aligned",)  # statuses that are no refusal
     of_imu: bool = False  # the truth is the attitude of the IMU, not of the body that it turns in
     left_out: bool = False  # no log can show it: kept to show what it costs
+    flagged: bool = False  # no model holds this world: a flag is right
 
 
 def place(rng: np.random.Generator) -> dict[str, str]:
@@ -101,7 +102,7 @@ def outcome(case: Case, seed: int, run: int) -> Outcome:
     ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
     known = answer.status != "level_only" or "level_only" not in case.good
     ratios = {"heading": ratio[2:], "level": ratio[:2]} if known else {"level": ratio[:2]}
-    if answer.status == "inconsistent" and "inconsistent" in case.good:
+    if answer.status == "inconsistent" and case.flagged:
         ratios = {}  # it claims nothing
     refused = "" if answer.status in case.good else f"{answer.status}: {answer.reasons[0]}"
     return Outcome(ratios, refused, f"{answer.status} {answer.method} {np.degrees(phi) * 60} arcmin")
@@ -109,7 +110,9 @@ def outcome(case: Case, seed: int, run: int) -> Outcome:
 
 def framed(procedure: str, cases: Sequence[Case]) -> tuple[frame.Case, ...]:
     """These cases as rows of the matrix."""
-    return tuple(frame.Case(procedure, case.name, partial(outcome, case), case.left_out) for case in cases)
+    return tuple(
+        frame.Case(procedure, case.name, partial(outcome, case), case.left_out, case.flagged) for case in cases
+    )
 
 
 def main(cases: Sequence[Case]) -> None:

@@ -28,7 +28,6 @@ from truenorth.alignment.result import Alignment
 from truenorth.records import GnssRecord, VelocityRecord
 
 GOOD = ("aligned", "level_only", "not_converged")
-FLAGGED = (*GOOD, "inconsistent")  # of a wrong class of IMU: what is said must be right, and it may be refused
 
 
 def drive(rng: np.random.Generator, fastest: float, rate: float, climb: float = 0.0) -> dict[str, Any]:
@@ -240,8 +239,9 @@ CASES = (
         by("industrial", noise=ODOMETER_SIGMA),
         GOOD,
     ),
-    Case("IMU industrial, given as tactical", vehicle("industrial", FIXES), by("tactical"), FLAGGED),
-    Case("IMU consumer, given as industrial", vehicle("consumer", FIXES), by("industrial"), FLAGGED),
+    # of a wrong class of IMU what is said must be right, and it may be refused
+    Case("IMU industrial, given as tactical", vehicle("industrial", FIXES), by("tactical"), GOOD, flagged=True),
+    Case("IMU consumer, given as industrial", vehicle("consumer", FIXES), by("industrial"), GOOD, flagged=True),
 )
 
 if __name__ == "__main__":

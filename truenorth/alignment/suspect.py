@@ -22,6 +22,7 @@ from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import contradiction, note
 
+LED_AWAY = "innovations.step"
 CLOCKS = ("second_look.late", "second_look.early", "delay.gyros_")  # evidence of them
 
 
@@ -68,7 +69,9 @@ def name_specification(answer: Alignment, again: Callable[[ImuSpec], Alignment])
     if clocks:
         return replace(answer, evidence=(*clocks, *(item for item in answer.evidence if item not in clocks)))
     axes = any("imu_axes" in item.remedies for item in answer.evidence if item.key == "bias.accel")
-    if axes or not any(item.key.startswith("innovations.") for item in answer.evidence):
+    # A receiver that is led away is none of the IMU's, though a poorer one would follow it.
+    spoken = [item.key for item in answer.evidence if item.kind != "note" and item.key != LED_AWAY]
+    if axes or not any(key.startswith("innovations.") for key in spoken):
         return answer
     for factor in FACTORS:
         try:
