@@ -55,6 +55,8 @@ class Line:
     worst: float
     worst_run: int
     seconds: float
+    # in how many runs each output has been shown; all when left out
+    shown: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def mark(self) -> str:
@@ -66,16 +68,16 @@ class Line:
         if self.case.left_out:
             return "left out"
         # A ratio of few runs scatters: 1/sqrt(2 N) of itself, three times of which is chance.
-        room = 3.0 / math.sqrt(2.0 * max(self.runs, 1))
+        rooms = {name: 3.0 / math.sqrt(2.0 * max(self.shown.get(name, self.runs), 1)) for name in self.rms}
         if self.worst > DEFECT:
             return "defect"
         if self.case.flagged and self.refused:
             return "flagged"
         if len(self.refused) > max(0.1 * self.runs, 1.0):
             return "refused"
-        if any(value > max(HONEST[1], 1.0 + room) for value in self.rms.values()):
+        if any(value > max(HONEST[1], 1.0 + rooms[name]) for name, value in self.rms.items()):
             return "small"
-        if any(value < min(HONEST[0], 1.0 - room) for value in self.rms.values()):
+        if any(value < min(HONEST[0], 1.0 - rooms[name]) for name, value in self.rms.items()):
             return "large"
         return "ok"
 
@@ -116,7 +118,8 @@ def run_case(case: Case, seed: int, runs: int, verbose: bool = False) -> Line:
             print(f"    run {run}: {shown} {outcome.refused} {outcome.said}", flush=True)
     seen = {name: np.concatenate(r) for name, r in found.items()}  # NaN: what a log does not show is not said
     rms = {name: float(np.sqrt(np.nanmean(r**2))) for name, r in seen.items() if np.isfinite(r).any()}
-    return Line(case, runs, rms, tuple(refused), *worst, (time.perf_counter() - begun) / max(runs, 1))
+    shown = {name: sum(bool(np.isfinite(r).any()) for r in found[name]) for name in rms}
+    return Line(case, runs, rms, tuple(refused), *worst, (time.perf_counter() - begun) / max(runs, 1), shown)
 
 
 def as_markdown(lines: Sequence[Line]) -> str:

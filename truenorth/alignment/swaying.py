@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
-FILTER_PASSES = 8
+FILTER_PASSES = 24  # of gyros with a bias of some earth rates that turn on an indexer; the others settle in five
 FITS = 5  # of the motion, one a pass: another would make 13 of 14 logs no likelier
 
 
