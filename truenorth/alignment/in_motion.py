@@ -32,7 +32,7 @@ from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.suspect import as_noisy_as_its_rows, name_specification
+from truenorth.alignment.suspect import name_specification
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
@@ -41,6 +41,7 @@ from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
+from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.estimate.poorer import ALONE, poorer_evidence, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
@@ -166,7 +167,7 @@ def align_in_motion(
         return _aligned(task.with_spec(spec), method, heading_limit, passes, unknown, tell)
 
     answer = _aligned(task, method, heading_limit, passes, unknown, tell)
-    answer = as_noisy_as_its_rows(answer, task.record, aligned)
+    answer = as_noisy_as_its_rows(answer, task.record, task.spec, aligned)
     return name_specification(answer, aligned)
 
 

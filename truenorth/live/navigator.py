@@ -35,9 +35,9 @@ from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.given import arm_as_begun, kept_altitude, mountings_found, turns_velocity
-from truenorth.navigation.procedure import FINE, PLUMB_LINE, start_of
+from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
-from truenorth.navigation.start import force_at_rest
+from truenorth.navigation.start import force_at_rest, start_of
 from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR

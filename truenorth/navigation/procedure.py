@@ -22,6 +22,7 @@ from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.height_drift import height_evidence
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
+from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.estimate.poorer import growth_along, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
@@ -40,7 +41,7 @@ from truenorth.navigation.given import (
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
-from truenorth.navigation.start import force_at_rest, of_poorer, read_start, start_from_alignment
+from truenorth.navigation.start import force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
@@ -53,7 +54,7 @@ from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
 from truenorth.records import GnssRecord, ImuRecord, Late
 from truenorth.records.specified import corrected, seen_in
-from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import SLOW_ACCEL, SLOW_GYRO
 from truenorth.state.state import Start
@@ -141,6 +142,50 @@ def navigate(
     AlignmentError
         The alignment has no usable heading.
     """
+    by = partial(
+        _by_specification,
+        record,
+        start,
+        aid=aid,
+        altitude=altitude,
+        zupt=zupt,
+        smooth=smooth,
+        scale_factors=scale_factors,
+        errors=errors,
+        deflection=deflection,
+        calibration=calibration,
+        check_clocks=check_clocks,
+        interval=interval,
+        output=output,
+        damping=damping,
+        progress=progress,
+    )
+    answer = by(imu=imu)
+    if damping is not None or answer.status != "inconsistent":
+        return answer
+    return as_noisy_as_its_rows(answer, ImuRecord.of(record), start_of(start, imu)[1], lambda other: by(imu=other))
+
+
+def _by_specification(
+    record: ImuRecord,
+    start: Alignment | Start | str | PathLike[str],
+    *,
+    aid: Aid | Sequence[Aid],
+    altitude: Altitude | None,
+    zupt: str | Sequence[tuple[float, float]] | None,
+    smooth: bool,
+    imu: ImuSpec | str | None,
+    scale_factors: bool,
+    errors: Sequence[Group | str],
+    deflection: Deflection,
+    calibration: Calibration | None,
+    check_clocks: bool,
+    interval: float | None,
+    output: float | None,
+    damping: Damper | None,
+    progress: Callable[[str], None] | None,
+) -> Navigation:
+    """:func:`navigate` by one specification."""
     tell = progress or (lambda stage: None)
     given = by_key(aid)
     begin, spec, imu_source = start_of(start, imu)
@@ -328,28 +373,6 @@ def _intervals(
     if not (interval > 0.0 and output > 0.0):
         raise UsageError(f"interval {interval:g} s, output {output:g} s; expected both above zero")
     return interval, max(1, round(output / interval))
-
-
-def start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
-    """Where navigation begins, the specification, and where that comes from; arguments as for :func:`navigate`."""
-    spec = None if imu is None else imu_spec(imu)
-    if isinstance(start, Start):
-        if spec is None:
-            raise UsageError(
-                "a start without a specification of the IMU; expected imu='navigation', a file or an ImuSpec"
-            )
-        return start, spec, spec.name
-    if isinstance(start, (str, PathLike)):
-        begin, own, _ = read_start(start)
-        where = own.name
-    elif not hasattr(start, "imu_source"):
-        raise UsageError(
-            f"start is a {type(start).__name__}; expected an Alignment, a Start or the folder of an alignment"
-        )
-    else:
-        own, where = start.imu, start.imu_source
-        begin = start_from_alignment(start)
-    return begin, spec or own, where if spec is None else spec.name
 
 
 def _from_start(record: ImuRecord, start: Start) -> ImuRecord:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION, normal_gravity
-from truenorth.core.errors import AlignmentError, DataError
+from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.json_file import read_object
 from truenorth.core.paths import as_path
 from truenorth.core.position import Position
@@ -33,6 +33,28 @@ Array = NDArray[np.float64]
 
 LEAST_VELOCITY_SIGMA = 1e-3  # m/s
 SUMMARY = "summary.json"
+
+
+def start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
+    """Where navigation begins, the specification, and where that comes from; arguments as for :func:`truenorth.navigate`."""
+    spec = None if imu is None else imu_spec(imu)
+    if isinstance(start, Start):
+        if spec is None:
+            raise UsageError(
+                "a start without a specification of the IMU; expected imu='navigation', a file or an ImuSpec"
+            )
+        return start, spec, spec.name
+    if isinstance(start, (str, PathLike)):
+        begin, own, _ = read_start(start)
+        where = own.name
+    elif not hasattr(start, "imu_source"):
+        raise UsageError(
+            f"start is a {type(start).__name__}; expected an Alignment, a Start or the folder of an alignment"
+        )
+    else:
+        own, where = start.imu, start.imu_source
+        begin = start_from_alignment(start)
+    return begin, spec or own, where if spec is None else spec.name
 
 
 def start_from_alignment(alignment: Alignment) -> Start:
