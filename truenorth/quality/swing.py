@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
 from truenorth.aiding.velocity import SMOOTHED_VELOCITY
+from truenorth.core.remembered import remembered
 from truenorth.errors.group import Group
 from truenorth.quality.stamps import likelihoods, pairs
 from truenorth.quality.whiteness import FEWEST
@@ -87,14 +88,21 @@ def with_unseen_arm(aiding: Iterable[Aiding], record: ImuRecord) -> list[Aiding]
 
 
 def _smoothed(source: Aiding, record: ImuRecord) -> Aiding:
-    rates = increments(record)[0] / record.steps[:, None]
-    middle, half = record.time - 0.5 * record.steps, _filters(source.time)
+    half = _filters(source.time)
+    middle, rates, means = _rates(record, half)
     now = np.stack([np.interp(source.time, middle, rate) for rate in rates.T], axis=1)
     # Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
-    quick = now - _means(record, _means(record, rates, middle, half), source.time, half)
+    quick = now - _means(record, means, source.time, half)
     unseen = Group(UNSEEN_ARM, np.hypot(source.lever_arm, source.states["lever arm"].sigma), unit="m")
     measured = np.hstack([source.measured, quick])
     return replace(source, kind=SMOOTHED_VELOCITY, measured=measured, states={**source.states, "filter": unseen})
+
+
+@remembered
+def _rates(record: ImuRecord, half: float) -> tuple[Array, Array, Array]:
+    """Middles of the rows (N,), s, their rates (N, 3), rad/s, and means of these over twice `half`, s: each pass asks for them."""
+    rates, middle = increments(record)[0] / record.steps[:, None], record.time - 0.5 * record.steps
+    return middle, rates, _means(record, rates, middle, half)
 
 
 def _filters(time: Array) -> float:
