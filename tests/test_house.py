@@ -153,3 +153,14 @@ def test_what_a_message_names_has_an_option():
     for name, option in OPTIONS.items():
         assert set(re.findall(r"--[a-z-]+", option)) <= known, option
         assert f"`{name}`" in text, name
+
+
+def test_no_merge_is_left_half_done():
+    """No text of the repository, its documents among it, holds the marks of a merge."""
+    home = ROOT.parent
+    kinds = {".py", ".md", ".yaml", ".yml", ".toml", ".po", ".txt"}
+    folders = [home / name for name in ("truenorth", "tests", "docs", "benchmarks", "examples")]
+    texts = [path for path in home.iterdir() if path.suffix in kinds]
+    texts += [path for folder in folders for path in folder.rglob("*") if path.suffix in kinds]
+    mark = re.compile(r"^(<{7} |>{7} |={7}$)", re.MULTILINE)
+    assert [path.name for path in texts if mark.search(path.read_text("utf-8", errors="replace"))] == []

@@ -71,12 +71,12 @@ class Line:
         rooms = {name: 3.0 / math.sqrt(2.0 * max(self.shown.get(name, self.runs), 1)) for name in self.rms}
         if self.worst > DEFECT:
             return "defect"
-        if self.case.flagged and self.refused:
-            return "flagged"
-        if len(self.refused) > max(0.1 * self.runs, 1.0):
+        if not self.case.flagged and len(self.refused) > max(0.1 * self.runs, 1.0):
             return "refused"
         if any(value > max(HONEST[1], 1.0 + rooms[name]) for name, value in self.rms.items()):
             return "small"
+        if self.case.flagged and self.refused:
+            return "flagged"
         if any(value < min(HONEST[0], 1.0 - rooms[name]) for name, value in self.rms.items()):
             return "large"
         return "ok"
@@ -104,7 +104,8 @@ def run_case(case: Case, seed: int, runs: int, verbose: bool = False) -> Line:
             outcome = case.run(seed, run)
         except TruenorthError as error:
             outcome = Outcome(refused=str(error))
-        for name, ratio in outcome.ratios.items():
+        # A case that is to be flagged is asked for what it claims without a flag.
+        for name, ratio in () if case.flagged and outcome.refused else outcome.ratios.items():
             found.setdefault(name, []).append(np.ravel(ratio))
         if outcome.refused:
             refused.append(f"run {run}: {outcome.refused}")

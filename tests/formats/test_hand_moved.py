@@ -41,6 +41,24 @@ def test_waved_sensor(tmp_path, seed, of_gyro, of_accel):
     np.testing.assert_allclose(record.accel, accel, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.parametrize("spin", [120.0, 200.0, 400.0])
+@pytest.mark.parametrize(("of_gyro", "of_accel"), [(DEG, G), (1.0, 1.0)], ids=["deg/s, g", "rad/s, m/s^2"])
+def test_a_steady_spin_is_no_rest(tmp_path, spin, of_gyro, of_accel):
+    """A turntable that turns forth and back for a minute each: its rate is as steady as a rest, which is half as long."""
+    rng = np.random.default_rng(3)
+    time = np.arange(1, 20001) / RATE
+    turn = np.select(
+        [time < 10.0, time < 70.0, time < 80.0, time < 140.0, time < 190.0], [0.0, 1.0, 0.0, -1.0, 0.3 * np.sin(time)]
+    )
+    gyro = 2e-4 * rng.standard_normal(3) + 5e-4 * rng.standard_normal((len(time), 3))
+    gyro[:, 2] += spin * DEG * turn
+    accel = [0.0, 0.0, G] + 0.02 * rng.standard_normal((len(time), 3))
+    head = "time,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z"
+    rows = np.column_stack([time, accel / of_accel, gyro / of_gyro])
+    np.savetxt(path := tmp_path / "table.csv", rows, fmt="%.8g", delimiter=",", header=head, comments="")
+    np.testing.assert_allclose(read_imu(path).gyro, gyro, rtol=1e-6, atol=1e-9)
+
+
 def test_clock_that_stands_still(tmp_path):
     """A receiver without satellites repeats its time of week: no clock, and not a time that repeats."""
     _, gyro, accel = waved(1)

@@ -116,10 +116,10 @@ def test_navigation_killed_and_resumed_goes_on_from_the_same_alignment(logs, tmp
     start = tn.load(tmp_path / START)
     record = tn.read_imu(logs / "log.csv")
     gnss, odometer = tn.read_gnss(logs / "gnss.csv"), tn.read_odometer(logs / "odometer.csv")
-    from truenorth.live.onward import UNKNOWN
+    from truenorth.live.onward import as_found
 
     aid = [
-        tn.Gnss(gnss.between(None, record.time[-1]), UNKNOWN["gnss"]),
+        tn.Gnss(gnss.between(None, record.time[-1]), as_found(start)["gnss"]),
         tn.Odometer(odometer.between(None, record.time[-1])),
     ]
     whole = tn.navigate(record, start, aid=aid, interval=0.2, output=1.0)

@@ -1,6 +1,6 @@
 """A vehicle that vibrates faster than its rows show: they are noisier than the specification says, and no bias wanders."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -37,17 +37,46 @@ def test_a_vehicle_that_vibrates_is_navigated(run):
     assert found.track.sigma[-1, 2] < np.radians(5.0)
 
 
+@dataclass(frozen=True)
+class Found:
+    """An answer."""
+
+    status: str
+    imu_source: str = "tactical"
+    evidence: tuple = ()
+
+
+@pytest.mark.parametrize("silent", ["gyro_random_walk", "accel_random_walk"])
+@pytest.mark.parametrize("rows", [slice(0, 6000), np.r_[0:2000, 2100:6000]], ids=["whole", "a gap"])
+def test_noisy_rows_of_a_specification_that_is_silent(silent, rows):
+    """A walk that a data sheet leaves out is that of the rows, and a gap hides nothing."""
+    rng = np.random.default_rng(SEED)
+    data = np.repeat([0.01, 0.1], 3) * rng.standard_normal((6000, 6))
+    time = np.arange(1, 6001) / 100.0
+    record = ImuRecord(time[rows], data[rows, :3], data[rows, 3:] + [0.0, 0.0, 9.8])
+    spec = replace(imu_spec("tactical"), **{silent: 0.0})
+    asked = []
+
+    def again(other):
+        asked.append(other)
+        return Found("aligned")
+
+    answer = as_noisy_as_its_rows(Found("inconsistent"), record, spec, again)
+    assert answer.status == "aligned"
+    assert answer.evidence[0].urgent
+    assert asked[0].gyro_random_walk == pytest.approx(0.001, rel=0.15)
+    assert asked[0].accel_random_walk == pytest.approx(0.01, rel=0.15)
+    assert asked[0].name == "tactical, noise of the rows"
+
+
 def test_a_log_as_noisy_as_specified_is_navigated_once():
     """A contradiction that is none of its noise is left as it is."""
     spec, rng = imu_spec("tactical"), np.random.default_rng(SEED)
     data = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3) * 10.0 * rng.standard_normal((6000, 6))
     record = ImuRecord(np.arange(1, 6001) / 100.0, data[:, :3], data[:, 3:] + [0.0, 0.0, 9.8])
 
-    class Found:
-        status, imu_source = "inconsistent", "tactical"
-
     def again(other):
         raise AssertionError(other)
 
-    answer = Found()
+    answer = Found("inconsistent")
     assert as_noisy_as_its_rows(answer, record, spec, again) is answer

@@ -120,7 +120,8 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
 def _of_own_clock(source: Aiding, mounting: Mounting) -> Aiding:
     """A receiver's velocities with the delay that is theirs alone."""
     own = mounting.of_velocities
-    states = {**source.states, **states_of(replace(mounting, latency_sigma=own.latency_sigma), source.name, "lag")}
+    others = {key: group for key, group in source.states.items() if key != "lag"}  # that is of the places
+    states = others | states_of(replace(mounting, latency_sigma=own.latency_sigma), source.name, "lag")
     return replace(source, time=source.time + mounting.latency - own.latency, states=states)
 
 

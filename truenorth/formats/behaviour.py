@@ -149,17 +149,21 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
 def _at_rest_part(data: Array, interval: float) -> Array:
     """The longest rest of a sensor that is moved for a part of the log; the whole log where none stands out.
 
-    What the gyros say at rest (their bias, the earth's rate, their noise) nothing says while a hand turns them.
+    What the gyros say at rest (their bias, the earth's rate, their noise) nothing says while a hand turns them. A turntable's rate
+    is as steady as a rest: of steady seconds those count whose rate is the least. Seconds without any noise are of a dead sensor.
     """
     rows = max(2, round(REST_CELL / interval))
     cells = len(data) // rows
     if cells < 5:
         return data
-    spread = np.linalg.norm(data[: cells * rows, :3].reshape(cells, rows, 3).std(axis=1), axis=1)
-    quiet = np.quantile(spread, 0.1)
-    if not np.quantile(spread, 0.9) > RESTS * quiet:
+    rates = data[: cells * rows, :3].reshape(cells, rows, 3)
+    mean, spread = rates.mean(axis=1), np.linalg.norm(rates.std(axis=1), axis=1)
+    alive = spread[spread > 0.0]
+    if not alive.size or not np.quantile(alive, 0.9) > RESTS * (quiet := np.quantile(alive, 0.1)):
         return data
-    rest = np.flatnonzero(spread <= 3.0 * quiet)
+    steady = (spread > 0.0) & (spread <= 3.0 * quiet)
+    least = mean[steady][np.argmin(np.linalg.norm(mean[steady], axis=1))]
+    rest = np.flatnonzero(steady & (np.linalg.norm(mean - least, axis=1) <= 3.0 * quiet))
     run = max(np.split(rest, np.flatnonzero(np.diff(rest) > 1) + 1), key=len)
     return data[run[0] * rows : (run[-1] + 1) * rows]
 

@@ -23,6 +23,9 @@ from truenorth.live.intake import Counts
 from truenorth.live.log import Kind
 from truenorth.live.navigator import Navigator
 from truenorth.live.recent import Recent
+from truenorth.navigation.given import late_as_found, mountings_found
+from truenorth.navigation.start import start_of
+from truenorth.state.mounting import Mounting
 
 Array = NDArray[np.float64]
 
@@ -30,6 +33,12 @@ UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: 
 SETTLED = 20.0  # s after a solution, from which a drive that began in its rows would have been noticed
 BACK = 10.0  # s before a solution's end, from which its filter may need rows
 RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
+
+
+def as_found(start: Alignment) -> dict[str, Mounting]:
+    """How sensors of which nothing is said are mounted, with what the alignment has found of them."""
+    begin = start_of(start, None)[0]
+    return mountings_found(begin) | {key: late_as_found(antenna, begin) for key, antenna in UNKNOWN.items()}
 
 
 class Onward:
@@ -107,7 +116,7 @@ class Onward:
 
     def navigator(self, start: Alignment, feeds: Mapping[str, Feed], **options: Any) -> Navigator:
         """One that begins at an alignment, with no row of the IMU yet."""
-        return Navigator(start, feeds=list(feeds.values()), mountings=UNKNOWN, kind=self.kind, **options)
+        return Navigator(start, feeds=list(feeds.values()), mountings=as_found(start), kind=self.kind, **options)
 
     def answer(self, reasons: Callable[[Alignment], tuple[str, ...]], counts: Counts) -> Answer | None:
         """What is known at the newest row; `reasons`: what there is to say of a solution. None before the first one."""

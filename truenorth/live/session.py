@@ -28,7 +28,7 @@ from truenorth.live.feed import Feed
 from truenorth.live.journal import Journal
 from truenorth.live.log import Kind
 from truenorth.live.navigator import Navigator
-from truenorth.live.onward import UNKNOWN
+from truenorth.live.onward import as_found
 from truenorth.live.regime import Turner
 from truenorth.live.sources import Source, Stream, open_source
 from truenorth.navigation import Navigation
@@ -146,7 +146,8 @@ class Session:
         run: Run
         # A run that was killed while it wrote its start has left the folder alone.
         if earlier and start is not None and (start / ARCHIVE).exists():
-            run = Navigator(load(start), feeds=self.feeds, mountings=UNKNOWN, kind=kind)
+            begin = load(start)
+            run = Navigator(begin, feeds=self.feeds, mountings=as_found(begin), kind=kind)
         else:
             aid = [*self.feeds, *([] if self.turner is None else [self.turner])]
             run = Aligner(self.place, self.imu, aid=aid, kind=kind, method=self.method, share=self.share)

@@ -163,7 +163,8 @@ def navigate(
     answer = by(imu=imu)
     if damping is not None or answer.status != "inconsistent":
         return answer
-    return as_noisy_as_its_rows(answer, ImuRecord.of(record), start_of(start, imu)[1], lambda other: by(imu=other))
+    log, spec = ImuRecord.of(record), start_of(start, imu)[1]
+    return as_noisy_as_its_rows(answer, log, seen_in(with_rounding(spec, log), log), lambda other: by(imu=other))
 
 
 def _by_specification(

@@ -125,18 +125,27 @@ def with_noise_of(record: ImuRecord, spec: ImuSpec) -> ImuSpec:
 
     Of stretches that look white, nine of ten are quieter, and of three axes each.
     """
-    _, density = noise_densities(record)
+    _, density = noise_densities(longest_stretch(record))
     shown = np.nan_to_num(density)
     if not len(shown):
         return spec
     loud = np.quantile(shown, 0.9, axis=0)
     gyro, accel = float(loud[:3].max()), float(loud[3:].max())
     more = limit("another sensor")
-    if 0.0 < more * spec.gyro_random_walk < gyro:
-        spec = replace(spec, gyro_random_walk=gyro)
-    if 0.0 < more * spec.accel_random_walk < accel:
-        spec = replace(spec, accel_random_walk=accel)
-    return spec
+    gyro = gyro if gyro > more * spec.gyro_random_walk else spec.gyro_random_walk
+    accel = accel if accel > more * spec.accel_random_walk else spec.accel_random_walk
+    if (gyro, accel) == (spec.gyro_random_walk, spec.accel_random_walk):
+        return spec
+    return replace(spec, name=f"{spec.name}, noise of the rows", gyro_random_walk=gyro, accel_random_walk=accel)
+
+
+def longest_stretch(record: ImuRecord) -> ImuRecord:
+    """The most rows of a record on end between two gaps; the record itself where it has none."""
+    if not record.gaps.size:
+        return record
+    edges = np.concatenate([[0], record.gaps, [len(record)]])
+    longest = int(np.argmax(np.diff(edges)))
+    return record[int(edges[longest]) : int(edges[longest + 1])]
 
 
 def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSpec, lat: float) -> list[Evidence]:

@@ -231,8 +231,9 @@ SENTENCES = {
         "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
     ),
     "specification.noisier": (
-        "the rows are noisier than the specification ({imu:imu}) says, the gyros {gyro:.3g} times and the accelerometers "
-        "{accel:.3g} times: a vehicle that vibrates, or another sensor; the answer is by the noise of the rows"
+        "the white noise of the rows (gyros {gyro:deg/sqrt(h)|} deg/sqrt(h), accelerometers {accel:ug/sqrt(Hz)|} ug/sqrt(Hz)) is "
+        "far more than the specification ({imu:imu}) says: a vehicle that vibrates, or another sensor; the answer counts it, and "
+        "such noise hides other errors, as of gyros that are late"
     ),
     "specification.suspect": (
         "the specification ({imu:imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"

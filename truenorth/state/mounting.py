@@ -101,6 +101,14 @@ class Mounting:
                 "centimetres or millimetres handed in?"
             )
         object.__setattr__(self, "lever_arm", arm)
+        if self.velocities is not None:
+            try:
+                clock = Clock(*map(float, self.velocities))
+            except (TypeError, ValueError):
+                clock = Clock(math.nan, math.nan)
+            if not (math.isfinite(clock.latency) and 0.0 <= clock.latency_sigma < math.inf):
+                raise UsageError(f"velocities={self.velocities!r}; expected how late they are and its sigma, s")
+            object.__setattr__(self, "velocities", clock)
 
 
 def mounting_angles(heading: float, pitch: float = 0.0, roll: float = 0.0) -> Array:

@@ -134,7 +134,9 @@ def integrals_of(out: Array) -> tuple[Array, Array, Array]:
 
 
 def go_on(dtheta: Array, dvel: Array, steps: Array, epochs: Array, bias: Array, state: Array, out: Array) -> None:
-    """:func:`inertial_integrals` of the next rows: from `state`, which is moved on, to the bits of one batch.
+    """:func:`inertial_integrals` of the next rows: from `state`, which is moved on.
+
+    To the bits of one batch where the rows before are a multiple of `ROWS`.
 
     Parameters
     ----------
