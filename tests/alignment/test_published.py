@@ -147,7 +147,7 @@ def test_an_azimuth_that_the_closed_loop_contradicts_is_not_believed(method, run
 @pytest.mark.slow
 def test_gyros_that_do_not_see_the_earth_turn_are_refused(drives):
     record, odometer, place, _, _ = drives[0]
-    with pytest.raises(AlignmentError, match=r"which gyro biases of 100 deg/h hide: choose auto or motion"):
+    with pytest.raises(AlignmentError, match=r"which gyro errors of 100 deg/h hide: choose auto or motion"):
         align(record, place, "industrial", aid=Odometer(odometer), method="sgkf")
 
 

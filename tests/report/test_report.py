@@ -126,7 +126,7 @@ def test_biases_and_motion_have_units_that_fit(aligned, levelled, tmp_path):
         assumed("sgkf"),
         "the IMU turns on an indexer (angles of 2 axes from enc.csv), the base may sway: its own motion is fitted to the log",
         "25 states, closed loop over 1999 rows of m.csv",
-        "gyro biases of 100 deg/h hide the earth's rate: motion has to tell heading",
+        "gyro errors of 100 deg/h hide the earth's rate: motion has to tell heading",
         "specification 'navigation'",
     ],
 )

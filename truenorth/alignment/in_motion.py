@@ -181,7 +181,7 @@ def _aligned(
         task = replace(task, position=find_latitude(lambda lat: _cost_at(task, lat)))
     if method == "auto":
         method = "gyrocompass" if able else "motion"
-        why = f"gyro biases of {significant(math.degrees(bias) * 3600)} deg/h " + (
+        why = f"gyro errors of {significant(math.degrees(bias) * 3600)} deg/h " + (
             "let the earth's rate tell heading" if able else "hide the earth's rate: motion has to tell heading"
         )
     else:
@@ -343,7 +343,7 @@ def _published(
     bias, able = _north_by_gyros(task)
     if not able:
         raise AlignmentError(
-            f"{task.record.source}: the filter {method} begins near the heading that the earth's rate gives, which gyro biases of "
+            f"{task.record.source}: the filter {method} begins near the heading that the earth's rate gives, which gyro errors of "
             f"{significant(math.degrees(bias) * 3600)} deg/h hide: choose auto or motion, or use better gyros"
         )
     track, acted = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
