@@ -91,7 +91,7 @@ def test_waves_that_carry_a_ship_as_they_roll_her_turn_no_gyros(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("in_doubt", [False, True])
 def test_what_may_be_a_push_as_well_is_in_sigma(in_doubt, monkeypatch):
-    """38 sigmas of heading, `aligned`, before. A push would explain 7 % of what the turn does; where that is doubt, it is in sigma."""
+    """38 sigmas of heading, `aligned`, before. A push would explain 7 % of the turn; where that is doubt, it is in sigma."""
     if in_doubt:
         monkeypatch.setattr(gyro_matrix, "limit", lambda name: 0.05 if name == "pushed in step" else limit(name))
     inputs, truth = BENCHES["swaying"].draw(12, 0)
