@@ -44,7 +44,12 @@ USUAL = {"wheel": WHEEL, "antenna": ANTENNA, "on master": ON_MASTER}
 ELSEWHERE = "another option, or the log itself"
 ONE_VALUE = "one value serves every log that is known; the library takes another"
 NOT_SAID = {
-    "Mounting": {"gate": ONE_VALUE, "slip": ONE_VALUE, "compliance": ONE_VALUE},
+    "Mounting": {
+        "gate": ONE_VALUE,
+        "slip": ONE_VALUE,
+        "compliance": ONE_VALUE,
+        "velocities": "found in the log; a latency that is said is that of places and velocities",
+    },
     "Barometer": {"record": ELSEWHERE, "mounting": "the weather's usual error"},
     "Attitude": {"record": ELSEWHERE},
     "Magnetometer": {

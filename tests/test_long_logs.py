@@ -34,7 +34,7 @@ def short_blocks(monkeypatch):
     """Blocks of few rows, so that a short log has many."""
     for module in list(sys.modules.values()):
         if getattr(module, "__name__", "").startswith("truenorth") and getattr(module, "BLOCK", None) == blocks.BLOCK:
-            monkeypatch.setattr(module, "BLOCK", 257)
+            monkeypatch.setattr(module, "BLOCK", 192)  # whole groups of 64, as the integration takes them
 
 
 def test_a_large_array_stays_on_the_disk_and_nothing_copies_it(tmp_path, record, monkeypatch):

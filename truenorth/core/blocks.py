@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-BLOCK = 2**19  # rows: 44 min at 200 Hz; six columns of doubles are 24 MiB
+BLOCK = (
+    2**19
+)  # rows: 44 min at 200 Hz; six columns of doubles are 24 MiB. A multiple of 64, which the integration takes at once
 
 
 def row_blocks(rows: int, unit: int = 1) -> Iterator[slice]:
