@@ -12,6 +12,7 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
+from truenorth.state.evidence import contradiction
 
 SEED = 43  # any
 
@@ -67,6 +68,14 @@ def test_noisy_rows_of_a_specification_that_is_silent(silent, rows):
     assert asked[0].gyro_random_walk == pytest.approx(0.001, rel=0.15)
     assert asked[0].accel_random_walk == pytest.approx(0.01, rel=0.15)
     assert asked[0].name == "tactical, noise of the rows"
+
+
+def test_a_receiver_led_away_at_rest_is_no_noise():
+    """However noisy the rows are, a vehicle that stands does not move."""
+    data = np.repeat([0.01, 0.1], 3) * np.random.default_rng(SEED).standard_normal((6000, 6))
+    record = ImuRecord(np.arange(1, 6001) / 100.0, data[:, :3], data[:, 3:] + [0.0, 0.0, 9.8])
+    answer = Found("inconsistent", evidence=(contradiction("innovations.at_rest"),))
+    assert as_noisy_as_its_rows(answer, record, imu_spec("tactical"), lambda spec: Found("aligned")) is answer
 
 
 def test_a_log_as_noisy_as_specified_is_navigated_once():
