@@ -42,6 +42,8 @@ def test_marks():
     few = Line(drawn(1.0), 8, {"heading": 1.8}, (), 2.5, 0, 0.1, {"heading": 3})
     assert few.mark == "ok"  # three of eight runs showed it
     assert replace(few, shown={}).mark == "small"
+    assert Line(drawn(1.0), 1, {}, ("no",), 0.0, 0, 0.1).mark == "refused"  # all of one is no chance
+    assert Line(drawn(1.0), 20, {"heading": 1.1}, ("no",) * 3, 2.0, 0, 0.1).mark == "refused"
     to_flag = replace(drawn(1.0), flagged=True)
     assert Line(to_flag, 8, {"heading": 1.1}, ("no",) * 8, 0.0, 0, 0.1).mark == "flagged"
     assert Line(to_flag, 8, {"heading": 1.1}, ("no",) * 7, 4.2, 0, 0.1).mark == "defect"

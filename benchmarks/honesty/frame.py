@@ -16,12 +16,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom
 
 from truenorth.core.errors import TruenorthError
 
 Array = NDArray[np.float64]
 HONEST = (0.8, 1.25)
 DEFECT = 4.0
+FALSE_ALARMS, RARE = 0.01, 0.02  # of sound logs at most; as seldom as that no chance
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Line:
         """What is wrong with it.
 
         ``ok``; ``left out`` on purpose; ``defect``: beyond four sigmas with a good status; ``flagged``: as is right; ``refused``:
-        more than a tenth, and more than one, which may be chance; ``small`` and ``large``: sigma.
+        more than a tenth, and more than false alarms of one in a hundred give by chance; ``small`` and ``large``: sigma.
         """
         if self.case.left_out:
             return "left out"
@@ -71,7 +73,8 @@ class Line:
         rooms = {name: 3.0 / math.sqrt(2.0 * max(self.shown.get(name, self.runs), 1)) for name in self.rms}
         if self.worst > DEFECT:
             return "defect"
-        if not self.case.flagged and len(self.refused) > max(0.1 * self.runs, 1.0):
+        by_chance = float(binom.sf(len(self.refused) - 1, self.runs, FALSE_ALARMS)) > RARE
+        if not self.case.flagged and len(self.refused) > 0.1 * self.runs and not by_chance:
             return "refused"
         if any(value > max(HONEST[1], 1.0 + rooms[name]) for name, value in self.rms.items()):
             return "small"
@@ -85,7 +88,7 @@ class Line:
         """Of the table."""
         rms = ", ".join(f"{name} {value:.2f}" for name, value in self.rms.items())
         if not rms:
-            rms = "none: each run was flagged"
+            rms = "none: each run was flagged" if self.case.flagged else "none"
         worst = f"{self.worst:.1f}" if self.worst else ""
         return [self.case.procedure, self.case.name, str(self.runs), rms, str(len(self.refused)), worst, self.mark]
 

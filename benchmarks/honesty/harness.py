@@ -102,8 +102,6 @@ def outcome(case: Case, seed: int, run: int) -> Outcome:
     ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
     known = answer.status != "level_only" or "level_only" not in case.good
     ratios = {"heading": ratio[2:], "level": ratio[:2]} if known else {"level": ratio[:2]}
-    if answer.status == "inconsistent" and case.flagged:
-        ratios = {}  # it claims nothing
     refused = "" if answer.status in case.good else f"{answer.status}: {answer.reasons[0]}"
     return Outcome(ratios, refused, f"{answer.status} {answer.method} {np.degrees(phi) * 60} arcmin")
 

@@ -16,7 +16,7 @@ from truenorth.estimate.poorer import FACTORS, poorer
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import contradiction
 
-LED_AWAY = "innovations.step"
+LED_AWAY = "innovations.step"  # evidence that a receiver is
 CLOCKS = ("second_look.late", "second_look.early", "delay.gyros_")  # evidence of them
 
 

@@ -11,11 +11,10 @@ otherwise, Schuler's oscillation and a current, runs straight over two `SPAN`, s
     D(v_INS - v_log) = -D(d/dt C_nb) l - D(G) e + D(int C_nb dt) b + noise
 
 with ``G e`` the scale, mounting and bias of :mod:`truenorth.errors.log` and b the biases of the accelerometers, which turn with the
-hull and change the INS's velocity as it turns (of 250 ug an arm of nothing was found 1.8 m off, ten of its sigmas), by robust least
-squares with their sigmas a priori. The
-means are by Hann's window, twice `SPAN` long: they have turns in them and no sway, of which the filters of many logs leave a
-part. How far the log is below the IMU they hardly show, nor does it matter to them. A log of forward speed alone, taken to make
-no leeway, has the arm to the point about which the hull turns.
+hull and change the INS's velocity as it turns (of 250 ug the arm of a log at the IMU was found 1.8 m long, ten of its sigmas), by
+robust least squares with their sigmas a priori. The means are by Hann's window, twice `SPAN` long: they have turns in them and no
+sway, of which the filters of many logs leave a part. How far the log is below the IMU they hardly show, nor does it matter to them.
+A log of forward speed alone, taken to make no leeway, has the arm to the point about which the hull turns.
 
 Source: P. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed. (2013), sec. 14.3.3 and
 16.3 (lever arm of an aiding velocity); the fit is ours.

@@ -23,7 +23,7 @@ from truenorth.live.intake import Counts
 from truenorth.live.log import Kind
 from truenorth.live.navigator import Navigator
 from truenorth.live.recent import Recent
-from truenorth.navigation.given import late_as_found, mountings_found
+from truenorth.navigation.given import late_as_found
 from truenorth.navigation.start import start_of
 from truenorth.state.mounting import Mounting
 
@@ -36,9 +36,9 @@ RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is no
 
 
 def as_found(start: Alignment) -> dict[str, Mounting]:
-    """How sensors of which nothing is said are mounted, with what the alignment has found of them."""
+    """How antennas of which nothing is said are mounted: as late as the alignment has found them."""
     begin = start_of(start, None)[0]
-    return mountings_found(begin) | {key: late_as_found(antenna, begin) for key, antenna in UNKNOWN.items()}
+    return {key: late_as_found(antenna, begin) for key, antenna in UNKNOWN.items()}
 
 
 class Onward:
