@@ -134,6 +134,14 @@ def test_an_arm_to_the_imu_is_the_opposite_of_one_from_it():
     np.testing.assert_array_equal(to_imu, -from_imu)
 
 
+def test_an_arm_from_the_master_is_known_to_a_metre_unless_something_else_is_said():
+    assert given(OnIndexer(lever_arm="1,2,3"), "on master")["lever_arm_sigma"] == 1.0
+    for sigma in (None, 0.1):
+        by, arm = ByMaster(lever_arm_sigma=sigma), OnIndexer(lever_arm="1,2,3")
+        assert by.mounted(arm).lever_arm_sigma == (1.0 if sigma is None else sigma)
+    assert ByMaster().mounted().lever_arm_sigma == 5.0
+
+
 def test_of_two_options_of_one_field_the_later_holds():
     known = given(Sensors(wheel_arm="1,2,3"), "wheel")
     doubtful = given(Sensors(wheel_arm="1,2,3", estimate="lever-arm"), "wheel")

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.honesty.frame import Case, Outcome, main
+from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.aiding.matching import What
 from truenorth.alignment.transfer import DELAY_WALK, align_transfer
 from truenorth.core.attitude import rotation_vector_from_dcm
@@ -135,20 +136,24 @@ def transferred(
     matching: What = "auto",
     far: bool = False,
     *,
+    unsaid: bool = False,
     seconds: float = SECONDS,
     constant: float = 0.0,
     scatter: float = 0.0,
 ) -> Any:
     """A run of a slave of a grade against a master with these errors; None: it is taken for the truth.
 
-    With `walks` its clock walks against the slave's. Where it is `far`, the arm is 15 to 40 m, known to .5 m. Its velocity goes
+    With `walks` its clock walks against the slave's. Where it is `far`, the arm is 15 to 40 m, known to .5 m;
+    `unsaid`: 5 m along each axis (one sigma), and nothing is said of it. Its velocity goes
     through a filter of the first order with a time `constant`, s, and its stamps `scatter` by so much, s (one sigma).
     """
 
     def run(seed: int, number: int) -> Outcome:
         rng = np.random.default_rng([seed, number])
         arm, tau, mount = rng.standard_normal(3), 0.05 * rng.standard_normal(), 3 * DEG * rng.standard_normal(3)
-        known: dict[str, Any] = {}
+        known: dict[str, Any] = {} if unsaid else {"lever_arm_sigma": 1.0}
+        if unsaid:
+            arm = VEHICLE_ARM * arm
         if far:
             toward = rng.standard_normal(3)
             given = rng.uniform(15.0, 40.0) * toward / np.linalg.norm(toward)
@@ -207,6 +212,15 @@ CASES: tuple[Case, ...] = tuple(
 )
 CASES += (
     Case("transfer", "aircraft, clock of the master as assumed", transferred(aircraft, ERRORS, walks=True)),
+    *(
+        Case(
+            "transfer",
+            f"{name}, {grade} slave, an arm of which nothing is said",
+            transferred(motion, ERRORS, grade=grade, matching=matching, unsaid=True),
+        )
+        for name, motion in (("ship", ship), ("aircraft", aircraft))
+        for grade, matching in (("tactical", "auto"), ("consumer", "velocity"))
+    ),
     Case(
         "transfer",
         "ship, consumer slave, by velocity alone",

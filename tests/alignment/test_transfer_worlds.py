@@ -109,6 +109,27 @@ def test_only_what_comes_back_is_noise():
     assert 3.0 < _colour(t, bend) < 7.0
 
 
+@pytest.mark.parametrize("said", some([{}], [{"lever_arm": (6.0, -8.0, 3.0)}]))
+def test_of_an_arm_nothing_is_said_or_it_is_measured(said):
+    """A ship's master ten metres away: refused, since an arm of which nothing was said was taken for known to a metre."""
+    way, arm = ship(), (6.2, -8.5, 3.4)
+    slave = simulate(way, rate=50.0, duration=120.0, imu=TACTICAL, seed=11).record
+    own = replace(MASTER, lever_arm=arm)
+    answer = align_transfer(slave, simulate_sensor(way, own, duration=120.0, seed=11).record, TACTICAL, **said)
+    assert answer.status == "aligned", answer.reasons
+    assert np.abs((answer.transfer.lever_arm - arm) / answer.transfer.lever_arm_sigma).max() < 4.0
+
+
+def test_a_tape_measures_an_arm_to_a_metre():
+    """Seven metres off it is not the one that was measured; nothing being said of it, it may be."""
+    way = ship()
+    slave = simulate(way, rate=50.0, duration=120.0, imu=TACTICAL, seed=11).record
+    master = simulate_sensor(way, replace(MASTER, lever_arm=(0.0, 9.0, 0.0)), duration=120.0, seed=11).record
+    answer = align_transfer(slave, master, TACTICAL, lever_arm=(0.0, 2.0, 0.0))
+    assert answer.status == "inconsistent"
+    assert any(item.key == "transfer.lever_arm" for item in answer.evidence)
+
+
 @pytest.mark.parametrize(("size", "found"), [(4e-3, []), (1e-1, ["transfer.lasting"])])
 def test_what_lasts_below_a_usual_noise_of_a_master_is_no_contradiction(size, found):
     """Rows without noise are believed to .01 m/s at best: the filter follows them slowly, and its innovations follow each other."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.aiding.matching import FIRST_NOISE, Matched, What, first_noise, matched
 from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
@@ -50,9 +51,9 @@ from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m, s, rad
+LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m, of an arm that is given; s, rad
 # Of an IMU of whose place on the master's vehicle nothing is said.
-ON_MASTER = Mounting(lever_arm_sigma=LEVER_ARM_SIGMA, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
+ON_MASTER = Mounting(lever_arm_sigma=VEHICLE_ARM, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
 DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
 PASSES = 3  # that fit the noise of the master's rows, and the attitude to linearise with
 PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
@@ -67,8 +68,8 @@ def align_transfer(
     imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,
     *,
     matching: What = "auto",
-    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
-    lever_arm_sigma: float = LEVER_ARM_SIGMA,
+    lever_arm: Sequence[float] | None = None,
+    lever_arm_sigma: float | None = None,
     delay: float = 0.0,
     delay_sigma: float = DELAY_SIGMA,
     mounting: Sequence[float] = (0.0, 0.0, 0.0),
@@ -102,10 +103,10 @@ def align_transfer(
         What of the master is matched; velocity and attitude, as far as it gives them, when left out. Position is slower than
         velocity and bears a constant error of the master's velocity (the sigma of velocity is against the master then);
         acceleration needs its specific force and attitude.
-    lever_arm : three floats, m
-        From the master to the slave, slave axes (right, forward, up).
-    lever_arm_sigma : float, m
-        0: known, and not estimated.
+    lever_arm : three floats, optional, m
+        From the master to the slave, slave axes (right, forward, up); zero when left out.
+    lever_arm_sigma : float, optional, m
+        0: known, and not estimated. Left out, 1 m of an arm that is given, 5 m of one of which nothing is said.
     delay, delay_sigma : float, s
         By which the master's stamps are late, and what that is uncertain by; 0: known.
     mounting : three floats, rad
@@ -140,7 +141,7 @@ def align_transfer(
     """
     tell = progress or (lambda stage: None)
     what = matched(matching, master)
-    arm = _three(lever_arm, "lever_arm", "metres: right, forward, up of the slave, from the master")
+    arm, lever_arm_sigma = _arm(lever_arm, lever_arm_sigma)
     angles = _three(mounting, "mounting", "radians: heading, pitch, roll of the slave seen from the master")
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
     if flexure is not None and not what.attitude:
@@ -305,6 +306,14 @@ def _check_sigmas(
         raise UsageError(f"delay is {delay}; expected seconds")
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
+
+
+def _arm(given: Sequence[float] | None, sigma: float | None) -> tuple[Array, float]:
+    """The arm and what it is uncertain by: of one that is given as a tape measures, else as on any vehicle."""
+    if sigma is None:
+        sigma = VEHICLE_ARM if given is None else LEVER_ARM_SIGMA
+    meaning = "metres: right, forward, up of the slave, from the master"
+    return _three((0.0, 0.0, 0.0) if given is None else given, "lever_arm", meaning), sigma
 
 
 def _three(values: Sequence[float], name: str, meaning: str) -> Array:

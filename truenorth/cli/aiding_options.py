@@ -10,6 +10,7 @@ from truenorth.cli.fields import (
     Sets,
     angles,
     arm,
+    arm_of_master,
     arm_to_imu,
     axes,
     bending,
@@ -134,7 +135,7 @@ class OnIndexer:
             "Right, forward, up, m, from the body's centre of rotation (or from the master) to the IMU; estimated without it."
         ),
         Sets("indexer", arm_to_imu),
-        Sets("on master", arm_to_imu),
+        Sets("on master", arm_of_master),
     ] = None
 
     def aids(self) -> list[Any]:
@@ -171,10 +172,12 @@ class ByMaster:
         Sets("on master", quantity_and_time("latency", "time", "latency_sigma")),
     ] = None
     lever_arm_sigma: Annotated[
-        float,
-        option("What --lever-arm (master to IMU) is uncertain by, m; 0: known."),
+        float | None,
+        option(
+            "What the arm from the master to the IMU is uncertain by, m; 0: known. Without it 1 of --lever-arm, else 5."
+        ),
         Sets("on master", plain("lever_arm_sigma")),
-    ] = 1.0
+    ] = None
     master_sigma: Annotated[
         str | None,
         option(
@@ -194,17 +197,22 @@ class ByMaster:
         """The master, where one is named; `others` are groups that say of its mounting, too."""
         if self.master is None:
             return []
-        from dataclasses import replace
-
         from truenorth.aiding.aids import Master
-        from truenorth.alignment.transfer import ON_MASTER
         from truenorth.formats import read_master
 
-        mounted = ON_MASTER
-        for group in (self, *others):
-            mounted = replace(mounted, **given(group, "on master"))
         record = read_master(self.master, columns=self.master_columns, units=self.master_units)
-        return [Master(record, mounted, **given(self, "master"))]
+        return [Master(record, self.mounted(*others), **given(self, "master"))]
+
+    def mounted(self, *others: Any) -> Any:
+        """How the master is mounted: what is usual, what the other groups say, and what these options do."""
+        from dataclasses import replace
+
+        from truenorth.alignment.transfer import ON_MASTER
+
+        mounted = ON_MASTER
+        for group in (*others, self):
+            mounted = replace(mounted, **given(group, "on master"))
+        return mounted
 
 
 @dataclass(frozen=True)

@@ -122,6 +122,13 @@ def arm_to_imu(text: str, option: str) -> Fields:
     return {"lever_arm": -_three(text, option)}
 
 
+def arm_of_master(text: str, option: str) -> Fields:
+    """The same from a master, known to what a tape measures on a vehicle unless something else is said."""
+    from truenorth.alignment.transfer import LEVER_ARM_SIGMA
+
+    return arm_to_imu(text, option) | {"lever_arm_sigma": LEVER_ARM_SIGMA}
+
+
 def _three(text: str, option: str) -> Any:
     import numpy as np
 

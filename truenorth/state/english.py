@@ -318,10 +318,10 @@ SENTENCES = {
         "{since:.1f} s on, by their motion: one of the clocks steps or runs at another rate"
     ),
     "transfer.rejected": "{share:.0%} of the master's rows contradict the slave",
-    "transfer.delay": "the delay comes out {miss:ms|.3g} ms from the assumed one, which was said to be known to {prior:ms|.3g} ms",
-    "transfer.lever_arm": "the lever arm comes out {miss:.3g} m from the assumed one, which was said to be known to {prior:.3g} m",
+    "transfer.delay": "the delay comes out {miss:ms|.3g} ms from the assumed one, which was taken as known to {prior:ms|.3g} ms",
+    "transfer.lever_arm": "the lever arm comes out {miss:.3g} m from the assumed one, which was taken as known to {prior:.3g} m",
     "transfer.mounting": (
-        "the mounting comes out {miss:deg|.3g} deg from the assumed one, which was said to be known to {prior:deg|.3g} deg"
+        "the mounting comes out {miss:deg|.3g} deg from the assumed one, which was taken as known to {prior:deg|.3g} deg"
     ),
     "transfer.lopsided": (
         "the master's {rows} differ from the prediction to one side all the time: the slave's errors are larger than its "
