@@ -60,3 +60,15 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     gc.freeze()
     gc.set_threshold(*GARBAGE)  # as the program does
     gc.enable()
+
+
+@pytest.fixture
+def without_gyro_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Alignments do not ask whether a matrix of the gyros explains their log: the search takes most of the time of some.
+
+    For tests of what else an alignment sees. That question only adds evidence, so that what is refused without it is refused with.
+    """
+    from truenorth.alignment import procedure, rotary
+
+    for module in (procedure, rotary):
+        monkeypatch.setattr(module, "gyro_matrix_evidence", lambda *_: [])

@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 READER = ("scipy.io", "truenorth.formats.mat_child")
 PLOTTER = ("pandas", "matplotlib.pyplot", "numba", "pyarrow.parquet", "pyarrow.csv", "pyarrow.compute", "scipy.interpolate",
-           "scipy.linalg", "scipy.optimize", "scipy.spatial.transform", "scipy.special", "scipy.stats", "jinja2", "pydantic",
+           "scipy.linalg", "scipy.optimize", "scipy.spatial.transform", "scipy.special", "jinja2", "pydantic",
            "rich.console", "rich.progress", "rich.table", "typer", "yaml")  # fmt: skip
 
 

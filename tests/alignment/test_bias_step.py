@@ -52,6 +52,7 @@ def test_sound_ships_show_no_step():
     assert found <= 4
 
 
+@pytest.mark.usefixtures("without_gyro_matrix")
 @pytest.mark.parametrize("run", some([0], [1]))
 def test_a_step_is_found(run):
     record, spec = ship(run)

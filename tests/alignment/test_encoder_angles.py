@@ -171,6 +171,7 @@ def test_an_encoder_of_five_hertz_and_a_log_that_ends_in_a_slew(said, still):
     assert not any(item.key == "bias.accel_scale" for item in answer.evidence)
 
 
+@pytest.mark.usefixtures("without_gyro_matrix")
 def test_a_gyro_bias_of_many_degrees_an_hour_is_no_turn_of_the_base():
     spec = biased("industrial")
     record, encoder, place, C_nb = indexed(spec, 8, 420.0)

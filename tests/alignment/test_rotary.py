@@ -88,6 +88,7 @@ def test_a_known_arm_gives_the_same(ship, answer):
     assert np.all(np.abs(apart) < np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN)
 
 
+@pytest.mark.usefixtures("without_gyro_matrix")
 def test_errors_of_the_indexer_itself_are_the_bodys(ship, answer):
     """Zeros off by 2 arcmin: the body is found as far off, many sigmas, unless it is said how good the angles are."""
     off = replace(ship.encoder, angles=ship.encoder.angles + 2.0 * ARCMIN)

@@ -14,6 +14,7 @@ from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
 
 
+@pytest.mark.usefixtures("without_gyro_matrix")
 @pytest.mark.parametrize("imu", [None, FOG])
 def test_an_accelerometer_that_drifts_on_an_idling_car_is_no_noise(imu):
     """.5 mg within the last quarter: gyros 180 times as noisy as usual explained it, and level was that of the drift, 5 sigmas off.

@@ -94,12 +94,21 @@ def _moments(record: ImuRecord, integrals: InertialIntegrals) -> Moments:
     last = int(ends[-1])
     C_after, _, _ = inertial_integrals(dtheta[:last], dvel[:last], steps[:last], np.arange(last + 1))
     C = 0.5 * (C_after[:-1] + C_after[1:])
-    row = np.repeat(np.arange(len(ends) - 1), np.diff(ends))
-    s = (edges[:last] + edges[1 : last + 1]) / 2 - integrals.time[row]
-    starts = ends[:-1]
+    rows = np.diff(ends)
+    row, longest = np.repeat(np.arange(len(rows)), rows), int(rows.max())
+    s = ((edges[:last] + edges[1 : last + 1]) / 2 - integrals.time[row])[:, None]
+
+    def by_interval(x: Array) -> Array:
+        """Of rows (N, m) those of each interval, with zeros behind the shorter ones."""
+        if int(rows.min()) == longest:
+            return x.reshape(len(rows), longest, -1)
+        whole = np.zeros((len(rows), longest, x.shape[1]))
+        whole[row, np.arange(last) - ends[row]] = x
+        return whole
+
+    attitude = np.swapaxes(by_interval(C.reshape(-1, 9)), 1, 2)
 
     def of(increment: Array, order: int) -> Array:
-        weighted = increment[:last] * (s**order)[:, None]
-        return np.stack([np.add.reduceat(C * weighted[:, None, None, j], starts, axis=0) for j in range(3)], axis=-1)
+        return np.asarray(attitude @ by_interval(increment[:last] * s**order)).reshape(-1, 3, 3, 3)
 
     return [of(dtheta, m) for m in range(3)], [of(dvel, m) for m in range(2)]

@@ -210,7 +210,7 @@ def _interval(A: Array, B: Array | None, statistic: str) -> tuple[float, float]:
     n = len(A) if B is None else min(len(A), len(B))
     of = OF_RUNS[statistic if statistic in OF_RUNS else "rms"]
     draws = np.random.default_rng(n).integers(0, n, (RESAMPLES, n))
-    found = np.array([of(A[i]) / (1.0 if B is None else of(B[i])) for i in draws])
+    found = of(A[draws]) / (1.0 if B is None else of(B[draws]))
     low, high = np.quantile(found, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
     return float(low), float(high)
 

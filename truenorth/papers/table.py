@@ -34,13 +34,13 @@ STATISTICS = (
     "slope",
 )
 UNITS = ("arcmin", "arcsec", "deg", "m", "m/s", "s", "min", "deg/h", "ug", "1")
-# Statistics of a rule, computed from the single runs.
-OF_RUNS: dict[str, Callable[[Array], float]] = {
-    "rms": lambda x: float(np.sqrt(np.mean(x**2))),
-    "mean": lambda x: float(np.mean(x)),
-    "median": lambda x: float(np.median(np.abs(x))),
-    "max": lambda x: float(np.max(np.abs(x))),
-    "p95": lambda x: float(np.quantile(np.abs(x), 0.95)),
+# Statistics of a rule, computed from the single runs, which the last axis counts.
+OF_RUNS: dict[str, Callable[[Array], Any]] = {
+    "rms": lambda x: np.sqrt(np.mean(x**2, axis=-1)),
+    "mean": lambda x: np.mean(x, axis=-1),
+    "median": lambda x: np.median(np.abs(x), axis=-1),
+    "max": lambda x: np.max(np.abs(x), axis=-1),
+    "p95": lambda x: np.quantile(np.abs(x), 0.95, axis=-1),
 }
 
 
@@ -168,12 +168,13 @@ class Table:
         common: dict[str, Any] = {"time": time, "start": start, "noise": noise, "runs": len(errors)}
         for statistic in statistics:
             interval = bootstrap_rms(errors) if statistic == "rms" else (math.nan, math.nan)
-            found = OF_RUNS[statistic](errors)
+            found = float(OF_RUNS[statistic](errors))
             self.value(case, method, quantity, statistic, found, unit, interval=interval, paper=paper, **common)
             paper = math.nan
         if sigmas is not None:
-            self.value(case, method, quantity, "sigma", OF_RUNS["rms"](sigmas), unit, **common)
-            self.value(case, method, quantity, "rms_over_sigma", OF_RUNS["rms"](errors / sigmas), "1", **common)
+            self.value(case, method, quantity, "sigma", float(OF_RUNS["rms"](sigmas)), unit, **common)
+            ratio = float(OF_RUNS["rms"](errors / sigmas))
+            self.value(case, method, quantity, "rms_over_sigma", ratio, "1", **common)
 
     def attitude(
         self,
@@ -223,7 +224,7 @@ class Table:
         if sample is not None and (values := sample.of(reference.statistic)) is not None:
             kind = reference.statistic if reference.statistic in OF_RUNS else "rms"
             unit = "1" if reference.statistic == "rms_over_sigma" else sample.unit
-            return OF_RUNS[kind](values), unit, len(values)
+            return float(OF_RUNS[kind](values)), unit, len(values)
         for f in self.figures:
             if _means(f, reference):
                 return f.value, f.unit, f.runs

@@ -97,7 +97,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         table.value(MAIN, f"network_{way}", "overshoot", "value", value, "m/s")
     drawn: dict[str, Any] = {"time": 48 * HOUR, "noise": "random_walk"}
     table.errors("drawn", "augmented_long", "nees", nees, "1", statistics=("mean",), **drawn)
-    ratio = OF_RUNS["rms"](heading)
+    ratio = float(OF_RUNS["rms"](heading))
     table.value("drawn", "augmented_long", "phi_u", "rms_over_sigma", ratio, "1", runs=count, **drawn)
     _add_signs(table, "random_signs", signs)
     for name, part in swept_signs(short, -0.3, min(count, choices.RUNS), seed, workers, progress).items():

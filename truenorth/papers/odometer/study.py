@@ -205,7 +205,7 @@ def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
 
 def _ended(errors: Errors) -> str:
     off = heading(errors, TIMES[-1]) / ARCMIN
-    rms, median = OF_RUNS["rms"](off), OF_RUNS["median"](off)
+    rms, median = (float(OF_RUNS[name](off)) for name in ("rms", "median"))
     return f"{rms:.1f}' RMS, median {median:.1f}', {np.mean(diverged(errors)):.0%} diverged"
 
 

@@ -266,4 +266,4 @@ def _add_cost(table: Table, seed: int) -> None:
 
 def _rms(errors: list[AttitudeErrors]) -> float:
     """Of heading over the runs at the end, arcmin."""
-    return OF_RUNS["rms"](errors[-1].phi[:, 2]) / ARCMIN
+    return float(OF_RUNS["rms"](errors[-1].phi[:, 2])) / ARCMIN
