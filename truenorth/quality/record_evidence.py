@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from truenorth.quality.alternation import alternation_evidence
 from truenorth.quality.codes import codes_evidence
+from truenorth.quality.hum import hum_evidence
 from truenorth.quality.plausibility import unit_findings
+from truenorth.quality.quantum import quantum_evidence
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding, check_sampling
+from truenorth.quality.spikes import spikes_evidence
 from truenorth.quality.tilt import check_tilt
 from truenorth.quality.vibration import vibration_evidence
 from truenorth.records import ImuRecord
@@ -61,6 +64,12 @@ def record_evidence(
     accel_bias = 0.0 if imu is None else math.sqrt(float(imu.bias_variance[3:].max()))
     tilt = check_tilt(record, C_sb, accel_bias)
     return found if tilt is None else found + tilt.evidence()
+
+
+def staying_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
+    """Evidence of the values of a base that stays at a latitude (rad), by what they do to means."""
+    checks = (quantum_evidence, codes_evidence, spikes_evidence, hum_evidence)
+    return [item for check in checks for item in check(record, lat)]
 
 
 def moving_evidence(record: ImuRecord) -> list[Evidence]:

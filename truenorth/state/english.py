@@ -216,6 +216,14 @@ SENTENCES = {
         "{heading:angle}, level by {level:angle}"
     ),
     "record.codes": "{name} is {value:.4g} in {rows} rows and no other from {from:.4g} to {to:.4g}: missing codes, or a dead band",
+    "record.spikes": (
+        "{count} single rows of {name} stand out to one side, and the rows around them show no motion: errors of the log, not "
+        "knocks; heading by {heading:angle}, level by {level:angle}"
+    ),
+    "record.hum": (
+        "gyros hum as on a cone, and the accelerometers show no tilt of it: no motion, but a drift of {drift:deg/h|} deg/h; "
+        "heading by {heading:angle}, level by {level:angle}"
+    ),
     "record.alternates": (
         "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
         "their mean is turned against either by {level:angle}"
