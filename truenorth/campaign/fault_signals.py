@@ -14,6 +14,7 @@ from truenorth.records import ImuRecord
 Array = NDArray[np.float64]
 
 PER_G = math.radians(1.0) / 3600.0 / 9.80665  # deg/h a g
+HALF_RANGE = 2**15  # counts of 16 bits
 
 
 def _hum(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
@@ -37,11 +38,12 @@ def _g_sensitive(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
 
 
 def _wrapped(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
-    """Counts of a sensor that roll over beyond .4 to .95 of its largest value."""
-    sensor, share = ("gyro", "accel")[int(rng.integers(2))], rng.uniform(0.4, 0.95)
+    """16-bit counts of a sensor that roll over beyond .4 to 1 of its largest value."""
+    sensor, share = ("gyro", "accel")[int(rng.integers(2))], rng.uniform(0.4, 1.0)
     values = getattr(record, sensor)
     end = share * float(np.max(np.abs(values)))
-    return replace(record, **{sensor: (values + end) % (2.0 * end) - end}), f"{sensor} beyond {end:.4g}"
+    counts = (np.round(values * HALF_RANGE / end) + HALF_RANGE) % (2 * HALF_RANGE) - HALF_RANGE
+    return replace(record, **{sensor: counts * (end / HALF_RANGE)}), f"{sensor} beyond {end:.4g}"
 
 
 def _clipped_between(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:

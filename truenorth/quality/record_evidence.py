@@ -14,6 +14,7 @@ from truenorth.quality.hum import hum_evidence
 from truenorth.quality.plausibility import unit_findings
 from truenorth.quality.quantum import quantum_evidence
 from truenorth.quality.regimes import MotionSummary
+from truenorth.quality.rolled_over import rolled_over_evidence
 from truenorth.quality.sampling import Finding, check_sampling
 from truenorth.quality.spikes import spikes_evidence
 from truenorth.quality.tilt import check_tilt
@@ -80,7 +81,7 @@ def moving_evidence(record: ImuRecord) -> list[Evidence]:
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     """Evidence of faults of clock, logging and range; `turns`: whether the base turns."""
     _, findings = check_sampling(record)
-    found = [*alternation_evidence(record)]
+    found = [*alternation_evidence(record), *rolled_over_evidence(record)]
     for finding in findings:
         serious = finding.severity == "error" or (finding.code in TURNING and finding.severity != "note")
         # What an increment counts is lost where another is written in its place; a rate at rest is held without harm.
