@@ -51,7 +51,7 @@ def test_counts_that_come_in_fours_are_no_end_of_a_range():
 
 @pytest.mark.parametrize("most", [1.0, 1.5, 2.02, 2.97])
 def test_counts_cut_off_on_one_side_alone(most):
-    """Other rows are farther out on the other side: no range has sides so unlike, but none of a counter's values is between counts."""
+    """The other side goes farther: no range has sides so unlike, but no value of a counter is between two counts."""
     rng = np.random.default_rng(8)
     record = base(duration=60.0)
     counts = np.clip(np.round(2.0 * rng.standard_normal(len(record))), -9.0, 3.0)

@@ -34,7 +34,13 @@ from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
-BLOCK, FEWEST = 1.0, 64  # s, and rows at least, of a window, in which gravity stays where it is, of an indexer, too
+BLOCKS = (
+    20.0,
+    1.0,
+)  # s of a window: the longer, the less noise of accelerometers; on an indexer gravity moves in the longer one
+FEWEST = 64  # rows of a window
+LINE = 3  # frequencies of a tone, by the taper of a window
+STAYS = 0.3  # rad, between the halves of a window
 SLOWEST = 2.0 * math.pi * 5.0  # rad/s, from which on an arm of a centimetre cannot hide the tilt
 LEAST = 2e-10  # rad/s, 4e-5 deg/h: no gyro has as small a bias
 
@@ -49,13 +55,13 @@ class Hum(NamedTuple):
 @remembered
 def hum_of(record: ImuRecord) -> Hum:
     """What gyros show of turns from 5 Hz on whose tilt the accelerometers do not show."""
-    length = max(round(BLOCK / record.interval), FEWEST)
+    length = _window(record)
     blocks = len(record) // length
     w = 2.0 * math.pi * np.arange(length // 2 + 1) / (length * record.interval)
     fast = w >= SLOWEST
     x = np.asarray(w[fast] * record.interval)
     made = share_of_increments(x) if record.kind == "increments" else 1.0 + share_left(x)
-    if not blocks or not fast.any():
+    if not blocks or np.count_nonzero(fast) < LINE:
         return Hum(np.zeros(3), 0.0)
     unit = 1.0 / record.interval if record.kind == "increments" else 1.0
     window = np.hanning(length)
@@ -75,10 +81,23 @@ def hum_of(record: ImuRecord) -> Hum:
         turned += np.abs(turn) ** 2
         tilt += np.sum(np.abs(GRAVITY_EQUATOR * np.cross(up, turn)) ** 2, axis=1)
         shown += np.sum(np.abs(np.cross(up, force)) ** 2, axis=1)
-    line = np.ones(3)  # of the window: a tone has three frequencies
+    line = np.ones(LINE)
     alone = np.convolve(shown, line, "same") < limit("tilt of a turn") * np.convolve(tilt, line, "same")
     largest = float(turned[alone].sum(axis=0).max())
     return Hum(made[alone] @ cone[alone] / blocks, math.sqrt(0.5 * largest / blocks))
+
+
+def _window(record: ImuRecord) -> int:
+    """Rows of the longest window in which gravity stays where it is in the axes of the IMU."""
+    for time in BLOCKS:
+        length = max(round(time / record.interval), FEWEST)
+        half = length // 2
+        halves = record.accel[: len(record) // length * length].reshape(-1, length, 3)
+        before, after = halves[:, :half].mean(axis=1), halves[:, half:].mean(axis=1)
+        across = np.linalg.norm(np.cross(before, after), axis=1)
+        if len(halves) and bool(np.all(across < STAYS * np.einsum("ki,ki->k", before, after))):
+            break
+    return length
 
 
 def hum_evidence(record: ImuRecord, lat: float) -> list[Evidence]:

@@ -321,7 +321,11 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             # Noise of less than a quantum takes a row one further down; half a quantum is for rounding.
             lowest = second - (1.5 if noise <= top - second else 0.5) * (top - second)
             crests = _crests(signed, rows_at, lowest, inside)
-            if not off and noise <= top - second and inside > limit("piled") * max(int(counts[-4:-1].max(initial=0)), 2):
+            if (
+                not off
+                and noise <= top - second
+                and inside > limit("piled") * max(int(counts[-4:-1].max(initial=0)), 2)
+            ):
                 continue  # steady between two counts: what clips does not stand at the second as well
             often = count > limit("piled") * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often) and not crests
