@@ -49,6 +49,19 @@ def test_counts_that_come_in_fours_are_no_end_of_a_range():
         assert ("saturated" in codes(inspect(ImuRecord(record.time, record.gyro, accel)))) == found
 
 
+@pytest.mark.parametrize("most", [1.0, 1.5, 2.02, 2.97])
+def test_counts_cut_off_on_one_side_alone(most):
+    """The other side goes farther: no range has sides so unlike, but no value of a counter is between two counts."""
+    rng = np.random.default_rng(8)
+    record = base(duration=60.0)
+    counts = np.clip(np.round(2.0 * rng.standard_normal(len(record))), -9.0, 3.0)
+    for end in (np.inf, most):
+        accel = record.accel.copy()
+        accel[:, 0] = 0.12 * np.minimum(counts, end)
+        between = end < np.inf and end != np.round(end)
+        assert ("saturated" in codes(inspect(ImuRecord(record.time, record.gyro, accel)))) == between
+
+
 def test_counts_summed_by_arithmetic_are_alike():
     """Sums of counts times their size differ by rounding: such neighbours are one level, and make no pile of it."""
     rng = np.random.default_rng(7)

@@ -7,7 +7,8 @@ from tests.runs import some
 from truenorth.aiding.aids import Odometer
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, misses
-from truenorth.quality.rounding import rounding_walks, with_rounding
+from truenorth.campaign.faults import run_faults
+from truenorth.quality.rounding import rounding_walks, with_held_rounding, with_rounding
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
 
@@ -99,3 +100,26 @@ def test_a_shaken_car_with_few_digits_is_no_more_sure_than_it_may_be(run: int, s
     answer = align(coarse, inputs["place"], inputs["imu"], aid=Odometer(inputs["odometer"], inputs["mounting"]))
     off = np.concatenate(list(misses(answer, truth).values()))
     assert answer.status != "aligned" or np.abs(off).max() < 4.0
+
+
+def test_what_is_held_and_what_is_white_make_the_walk() -> None:
+    """At the end of a log of one regime a bias and white noise leave what the walk does; a sensor without a step is as it was."""
+    rng, spec = np.random.default_rng(16), imu_spec("tactical")
+    record = _record(np.round(0.3 + 0.2 * rng.standard_normal(ROWS)))
+    walk, held, time = rounding_walks(record)[1], with_held_rounding(spec, record), ROWS / RATE
+    white, bias = (
+        np.sqrt(getattr(held, name) ** 2 - getattr(spec, name) ** 2) for name in ("accel_random_walk", "accel_bias")
+    )
+    assert white == pytest.approx(1.0 / np.sqrt(12.0 * RATE))
+    assert white**2 * time + (bias * time) ** 2 == pytest.approx(walk**2 * time, rel=0.01)
+    assert held.accel_rate_random_walk > spec.accel_rate_random_walk
+    assert (held.gyro_bias, held.gyro_random_walk) == (spec.gyro_bias, spec.gyro_random_walk)
+    fine = _record(rng.standard_normal(ROWS))
+    assert with_held_rounding(spec, fine) == spec
+
+
+@pytest.mark.slow
+def test_a_master_is_no_later_for_the_rounding_of_its_slave() -> None:
+    """Run 7 of seed 308: level was 4.1 sigmas off, `aligned`."""
+    trials = run_faults(["attitude"], ["coarse quantum"], runs=8, seed=308)
+    assert [t for t in trials if t.outcome in ("silent", "crash")] == []

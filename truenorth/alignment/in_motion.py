@@ -42,7 +42,7 @@ from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
-from truenorth.estimate.poorer import ALONE, poorer_evidence, poorer_rivals, poorer_tracks
+from truenorth.estimate.poorer import ALONE, BIASES, poorer_evidence, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
@@ -319,7 +319,7 @@ def _seen(
 
     def of_another_course() -> list[Rival]:
         warming = warming_rivals(other, track, task.record, task.spec)
-        return warming + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, ALONE))
+        return warming + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, ALONE | BIASES))
 
     found += poorer_evidence(of_another_imu, track, task.spec)
     span = task.record.duration

@@ -55,10 +55,8 @@ from truenorth.coarse.uncertainty import own_motion
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.staying import BA, BG, StaticModel, gained_velocity
-from truenorth.quality.codes import codes_evidence
 from truenorth.quality.density import specification_evidence
-from truenorth.quality.quantum import quantum_evidence
-from truenorth.quality.record_evidence import record_evidence
+from truenorth.quality.record_evidence import record_evidence, staying_evidence
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
@@ -172,7 +170,7 @@ def align_base(
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)
-    evidence += [] if sound else quantum_evidence(written, position.lat) + codes_evidence(written, position.lat)
+    evidence += [] if sound else staying_evidence(written, position.lat)
     if method in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         known: dict[str, Any] = {"calibration": calibration, "heading_limit": heading_limit, "sound": sound}
         own = align_base(as_written, position, imu, at=at, progress=progress, **known)

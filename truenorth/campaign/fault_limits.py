@@ -64,6 +64,7 @@ AXES = ("gyro axes turned", "gyro askew")  # a vehicle that turns about its vert
 # Faults that act as motion does: on the move only the aiding measurements speak of them.
 LIKE_MOTION = (
     *(f"{sensor} {what}" for sensor in ("gyro", "accel") for what in ("bias step", "bias ramp", "warming up", "scale")),
+    "gyros feel force",
     "specification ten times too good",
     "wrong arm",
     "slowly spoofed",

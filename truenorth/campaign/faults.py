@@ -19,13 +19,14 @@ from truenorth.campaign.fault_aids import AID_FAULTS
 from truenorth.campaign.fault_benches import BENCHES, Bench, misses
 from truenorth.campaign.fault_imu import IMU_FAULTS
 from truenorth.campaign.fault_limits import REST, misfit_at_rest, ratio_on_sway, unseen
+from truenorth.campaign.fault_signals import SIGNAL_FAULTS
 from truenorth.core.errors import TruenorthError, UsageError
 from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.navigation.result import Navigation
 
 Outcome = Literal["refused", "flagged", "harmless", "unseen", "silent", "crash"]
 Pair = tuple[str, int]  # a procedure and the number of its sound log
-FAULTS: tuple[Fault, ...] = (*IMU_FAULTS, *AID_FAULTS)
+FAULTS: tuple[Fault, ...] = (*IMU_FAULTS, *SIGNAL_FAULTS, *AID_FAULTS)
 SOUND = "none"
 HARMLESS = 3.0  # sigmas
 # sigma, by which a fault moves an answer at least where it is to blame: the rest is the log's own chance

@@ -42,11 +42,15 @@ FIELDS = ("bias", "turn_on_bias", "random_walk", "bias_instability", "rate_rando
 # the prior that a log shows whole, ``(1 - 1/9) chi_3^2 - 6 ln 3`` exceeds 10; of fewer, of more and of larger factors more seldom.
 ALONE = {"rival.scale_factors": ("scale_factor", "scale_factor_asymmetry"), "rival.misalignments": ("misalignment",)}
 KINDS = {"rival.poorer": FIELDS, **ALONE}
+# Where the earth's rate tells heading, a gyro's bias turns it: gyros that feel force, or are warmer than when they were calibrated,
+# have larger ones, and are no noisier.
+BIASES: dict[str, tuple[str, ...]] = {"rival.gyro_biases": ("gyro_bias", "gyro_turn_on_bias")}
 
 
 def poorer(spec: ImuSpec, factor: float, fields: Sequence[str] = FIELDS) -> ImuSpec:
-    """A specification all of whose errors, or those of these kinds, are so many times as large."""
-    names = [f"{sensor}_{field}" for sensor in ("gyro", "accel") for field in fields]
+    """A specification all of whose errors, or those of these kinds, of one sensor or of both, are so many times as large."""
+    both = [f"{sensor}_{field}" for sensor in ("gyro", "accel") for field in fields]
+    names = [name for name in (*fields, *both) if hasattr(spec, name)]
     return replace(spec, **{name: factor * getattr(spec, name) for name in names})
 
 

@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 
 from truenorth.quality.alternation import alternation_evidence
 from truenorth.quality.codes import codes_evidence
+from truenorth.quality.hum import hum_evidence
 from truenorth.quality.plausibility import unit_findings
+from truenorth.quality.quantum import quantum_evidence
 from truenorth.quality.regimes import MotionSummary
+from truenorth.quality.rolled_over import rolled_over_evidence
 from truenorth.quality.sampling import Finding, check_sampling
+from truenorth.quality.spikes import spikes_evidence
 from truenorth.quality.tilt import check_tilt
 from truenorth.quality.vibration import vibration_evidence
 from truenorth.records import ImuRecord
@@ -63,6 +67,12 @@ def record_evidence(
     return found if tilt is None else found + tilt.evidence()
 
 
+def staying_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
+    """Evidence of the values of a base that stays at a latitude (rad), by what they do to means."""
+    checks = (quantum_evidence, codes_evidence, spikes_evidence, hum_evidence)
+    return [item for check in checks for item in check(record, lat)]
+
+
 def moving_evidence(record: ImuRecord) -> list[Evidence]:
     """Evidence of a record on the move; of noise for a while see :func:`truenorth.estimate.rivals.noise_evidence`."""
     return vibration_evidence(record) + sampling_evidence(record, turns=True) + codes_evidence(record)
@@ -71,7 +81,7 @@ def moving_evidence(record: ImuRecord) -> list[Evidence]:
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     """Evidence of faults of clock, logging and range; `turns`: whether the base turns."""
     _, findings = check_sampling(record)
-    found = [*alternation_evidence(record)]
+    found = [*alternation_evidence(record), *rolled_over_evidence(record)]
     for finding in findings:
         serious = finding.severity == "error" or (finding.code in TURNING and finding.severity != "note")
         # What an increment counts is lost where another is written in its place; a rate at rest is held without harm.

@@ -1,9 +1,12 @@
-"""What rounding leaves in the integrals of a sensor on the move, as a random walk.
+"""What rounding leaves in the integrals of a sensor on the move: a random walk, or white noise and a bias that changes.
 
 A row that is rounded to steps of q, and whose remainder is lost, is off by an error of variance ``q^2 / 12``. Noise or motion of
 more than a step makes it white. Where less goes on it stays as it is, as long as the sensor stays where it is: of a sine of
 amplitude A a mean error of at most ``(q / pi) |J_0(2 pi A / q)|`` is left, of noise of sigma s it has ``exp(-2 pi^2 s^2 / q^2)``
 of that. A regime is a time in which the mean stays between the same two steps; its error acts over all of it.
+
+Of one variance at the end of a log, a walk forgets in seconds what a bias holds for a regime. A master whose attitude comes ten
+times a second shows a bias, and a walk as large hides its delay: that of a slave was 27 ms off, and its seat 8 sigmas.
 
 A counter that carries the remainder on loses nothing: the error of its rows is the difference of white noise, so that the floor of
 its spectrum, between the lines of a vibration, falls towards low frequencies. That of lost remainders does not.
@@ -14,7 +17,9 @@ Source: B. Widrow and I. Kollar, *Quantization Noise*, Cambridge 2008, ch. 4 and
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,24 +63,68 @@ def rounding_walks(record: ImuRecord) -> tuple[float, float]:
     record : ImuRecord
         As it was logged: neither corrected nor bridged.
     """
-    rows = max(FEWEST, round(WINDOW / record.interval))
     scale = record.interval if record.kind == "rates" else 1.0
-    lost = [[_lost(x, rows) for x in sensor.T] for sensor in (record.gyro, record.accel)]
-    # One logger wrote them: where most axes of a sensor carry on, so do those whose motion hides it.
-    if any(sensor.count(None) > 1 for sensor in lost):
-        return 0.0, 0.0
-    gyro, accel = (scale * max(x or 0.0 for x in sensor) / math.sqrt(record.interval) for sensor in lost)
+    gyro, accel = (scale * x.walk / math.sqrt(record.interval) for x in _of_sensors(record))
     return gyro, accel
 
 
-def _lost(values: Array, rows: int) -> float | None:
-    """Root of the variance by which the sum of a channel's values (N,) grows in each row; None where remainders are carried on."""
+def with_held_rounding(spec: ImuSpec, record: ImuRecord) -> ImuSpec:
+    """The specification with white noise of rounding, and with biases that change from regime to regime.
+
+    Parameters
+    ----------
+    spec : ImuSpec
+    record : ImuRecord
+        As it was logged: neither corrected nor bridged.
+    """
+    scale, unit = (record.interval, 1.0) if record.kind == "rates" else (1.0, 1.0 / record.interval)
+    more: dict[str, Any] = {}
+    for name, lost in zip(("gyro", "accel"), _of_sensors(record), strict=True):
+        if getattr(spec, f"{name}_quantisation") > 0.0 or lost.walk == 0.0:
+            continue
+        held = {
+            "random_walk": scale * lost.white / math.sqrt(record.interval),
+            "bias": unit * lost.held,
+            "rate_random_walk": unit * lost.held / math.sqrt(lost.rows * record.interval),
+        }
+        more |= {f"{name}_{key}": math.hypot(getattr(spec, f"{name}_{key}"), size) for key, size in held.items()}
+    return replace(spec, **more)
+
+
+class Lost(NamedTuple):
+    """Of the rows of a channel: one sigma of the white part and of what stays in a regime, and the rows of one."""
+
+    white: float
+    held: float
+    rows: float
+
+    @property
+    def walk(self) -> float:
+        """Root of the variance by which the sum of all rows grows in each."""
+        return math.hypot(self.white, self.held * math.sqrt(self.rows))
+
+
+NOTHING = Lost(0.0, 0.0, 1.0)
+
+
+def _of_sensors(record: ImuRecord) -> list[Lost]:
+    """What gyros and accelerometers lose, of the worst axis."""
+    rows = max(FEWEST, round(WINDOW / record.interval))
+    lost = [[_lost(x, rows) for x in sensor.T] for sensor in (record.gyro, record.accel)]
+    # One logger wrote them: where most axes of a sensor carry on, so do those whose motion hides it.
+    if any(sensor.count(None) > 1 for sensor in lost):
+        return [NOTHING, NOTHING]
+    return [max((x or NOTHING for x in sensor), key=lambda x: x.walk) for sensor in lost]
+
+
+def _lost(values: Array, rows: int) -> Lost | None:
+    """What rounding a channel (N,) loses; None where remainders are carried on."""
     if np.count_nonzero(np.diff(values) == 0.0) < REPEATS * len(values):
-        return 0.0
+        return NOTHING
     step, counts = lattice(values)
     windows = len(counts) // rows
     if step == 0.0 or windows == 0:
-        return 0.0
+        return NOTHING
     counts = counts[: windows * rows].reshape(windows, rows)
     mean, spread, lines = counts.mean(axis=1), counts.std(axis=1), _lines(counts)
     if spread.any() and _carried(lines[spread > 0.0].mean(axis=0)):
@@ -83,15 +132,18 @@ def _lost(values: Array, rows: int) -> float | None:
     floor = _floor(lines)
     of_noise = np.array([_of_noise(x) for x in counts])
     bounds = [0, *(1 + np.flatnonzero(np.abs(np.diff(mean)) > 0.5)), windows]
-    total = windows * rows / 12.0
+    sums = squares = 0.0
     for first, last in pairwise(bounds):
         part = slice(first, last)
         noise = max(NOISE * float(np.exp(np.mean(np.log(floor[part])))) - 1.0 / 12.0, 0.0)
         of_sine = _of_sine(np.sqrt(2.0 * np.maximum(spread[part] ** 2 - 1.0 / 12.0, 0.0))) * math.exp(
             -2.0 * math.pi**2 * noise
         )
-        total += float(rows * np.maximum(of_sine, of_noise[part]).sum()) ** 2
-    return step * math.sqrt(total / (windows * rows))
+        total = float(np.maximum(of_sine, of_noise[part]).sum())
+        sums += total**2
+        squares += total**2 / (last - first)
+    white, held = step / math.sqrt(12.0), step * math.sqrt(squares / windows)
+    return Lost(white, held, rows * sums / squares) if squares > 0.0 else Lost(white, 0.0, 1.0)
 
 
 def _carried(lines: Array) -> bool:

@@ -310,7 +310,9 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             cut = len(tail) > TAIL_LEVELS and count > limit("piled") * max(
                 int(tail.max()), 2
             )  # of many levels, each with few rows
-            if not cut and -float(levels[0]) > RANGE_SLACK * abs(top):  # a range has two sides alike: not its end
+            off = _off(top, levels[1:])  # what clips may have two sides
+            two_sided = -float(levels[0]) <= RANGE_SLACK * abs(top)
+            if not (cut or off or two_sided):  # a range has two sides alike: not its end
                 continue
             second = float(levels[-1])
             inside = int(counts[levels >= second - (PERIOD - 0.5) * _finest(levels)].max())
@@ -319,7 +321,11 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             # Noise of less than a quantum takes a row one further down; half a quantum is for rounding.
             lowest = second - (1.5 if noise <= top - second else 0.5) * (top - second)
             crests = _crests(signed, rows_at, lowest, inside)
-            if noise <= top - second and inside > limit("piled") * max(int(counts[-4:-1].max(initial=0)), 2):
+            if (
+                not off
+                and noise <= top - second
+                and inside > limit("piled") * max(int(counts[-4:-1].max(initial=0)), 2)
+            ):
                 continue  # steady between two counts: what clips does not stand at the second as well
             often = count > limit("piled") * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often) and not crests
@@ -327,7 +333,7 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             piled = piled and (
                 spread > 5.0 * (top - second) or (often and top - second > limit("piled") * _finest(levels))
             )
-            if piled or _off(top, levels[1:]):  # what clips has two sides
+            if piled or off:
                 rows[channel] += count
                 findings.append(
                     Finding(

@@ -85,7 +85,7 @@ def _cones(record: ImuRecord) -> Array:
     if not blocks:  # of rows that are nanoseconds apart a block's spectrum would fill the memory
         return np.empty((0, 3, 2))
     x = 2.0 * math.pi * np.arange(1, length // 2 + 1) / length
-    shares = (_share_left(x), np.ones_like(x)) if rates else (np.zeros_like(x), _share_of_increments(x))
+    shares = (share_left(x), np.ones_like(x)) if rates else (np.zeros_like(x), share_of_increments(x))
     # <theta x w>/2 of a tone of amplitude A: Im(A x conj(A))/(4 w), of whose two products each is the other's conjugate. A window
     # of power 3/8 makes A of W.
     scale = (8.0 / 3.0) * (2.0 * unit / length) ** 2 * record.interval / (2.0 * x)
@@ -105,12 +105,12 @@ def _squares(rows: Array) -> Array:
     return np.asarray(np.einsum("ki,ki->i", wide, wide).reshape(-1, 3).sum(axis=0) + np.einsum("ki,ki->i", rest, rest))
 
 
-def _share_of_increments(x: Array) -> Array:
+def share_of_increments(x: Array) -> Array:
     """Of a cone by the mean rates of intervals, of tones that turn by x rad in one."""
     return np.asarray(np.square(0.5 * x / np.sin(0.5 * x)))
 
 
-def _share_left(x: Array) -> Array:
+def share_left(x: Array) -> Array:
     """Share of the drift of a cone that the mechanisation makes too much, of tones that turn by x rad an interval."""
     z = np.exp(-1j * x)
     H = 1j * x * (5.0 + 8.0 * z - z * z) / (12.0 * (1.0 - z))

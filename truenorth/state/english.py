@@ -193,6 +193,10 @@ SENTENCES = {
         "scale factors {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
         "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "rival.gyro_biases": (
+        "gyro biases {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
     "rival.misalignments": (
         "misalignments {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
         "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
@@ -216,11 +220,20 @@ SENTENCES = {
         "{heading:angle}, level by {level:angle}"
     ),
     "record.codes": "{name} is {value:.4g} in {rows} rows and no other from {from:.4g} to {to:.4g}: missing codes, or a dead band",
+    "record.spikes": (
+        "{count} single rows of {name} stand out to one side, and the rows around them show no motion: errors of the log, not "
+        "knocks; heading by {heading:angle}, level by {level:angle}"
+    ),
+    "record.hum": (
+        "gyros hum as on a cone, and the accelerometers show no tilt of it: no motion, but a drift of {drift:deg/h|} deg/h; "
+        "heading by {heading:angle}, level by {level:angle}"
+    ),
     "record.alternates": (
         "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
         "their mean is turned against either by {level:angle}"
     ),
     "record.in_turn": "one in {rows} rows of accelerometers differs by {size:.3g} m/s^2: sensors in turn, {level:angle} apart",
+    "record.rolls_over": "{name} stands at {count:.0f} of {range:.0f} counts: gravity may have rolled over at a range's end",
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
         "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "

@@ -262,6 +262,14 @@ LIMITS: dict[str, Limit] = {
     "clearer encoder": Limit(
         4.0, "1", "times smaller squares of the base's turns that another reading of the angles must leave to be named"
     ),
+    "one-sided spikes": Limit(
+        4.0, "sigma", "of what noise adds to the rows around spikes: knocks and chance stay below it once in 16,000"
+    ),
+    "tilt of a turn": Limit(
+        0.25,
+        "of the squares",
+        "that gravity makes of a turn: accelerometers that show less do not turn, but for an arm of half to one and a half g/w^2",
+    ),
     "alternates": Limit(
         8.0, "sigma", "of the mean of all stretches: chance gives as many once in 10^8 channels (Student's t)"
     ),

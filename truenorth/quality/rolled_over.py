@@ -1,0 +1,55 @@
+"""Gravity at the end of a counter: counts that may have rolled over.
+
+A counter of b bits holds ``-2^(b-1) .. 2^(b-1) - 1``. What is beyond goes on at the other end: gravity of N counts, a little more
+than the half range, is written as ``N - 2^b``. An IMU at rest of which nothing is said then lies upside down with another bias of
+its accelerometers, and no other row says so. But the counts do: |N - 2^b| is the half range, less what N was beyond it. An
+accelerometer of that range could hold gravity and its bias only just, and is hardly made. Where another row of the sensor is beyond
+the half range the counter is no such one.
+
+Source: the arithmetic of two's complement; by how much the force may miss gravity is a limit of the unit's check.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.earth import GRAVITY_EQUATOR
+from truenorth.quality.quantum import lattice
+from truenorth.records import COLUMNS, ImuRecord
+from truenorth.state.evidence import Evidence, note
+from truenorth.state.limits import limit
+
+Array = NDArray[np.float64]
+
+BITS = (16, 24)  # finer counts than the noise do not show
+WHOLE = 1e-3  # of a count, by which values may miss multiples of the step
+
+
+def counts_of(sensor: Array) -> Array | None:
+    """Counts (N, 3) of a sensor whose channels have one step, counted from nothing; None where they have no such step."""
+    steps = [lattice(x)[0] for x in sensor.T]
+    step = min((x for x in steps if x > 0.0), default=0.0)
+    if step == 0.0:
+        return None
+    counts = sensor / step
+    whole = np.round(counts)
+    return whole if float(np.max(np.abs(counts - whole) / np.maximum(np.abs(whole) * 1e-6, 1.0))) < WHOLE else None
+
+
+def rolled_over_evidence(record: ImuRecord) -> list[Evidence]:
+    """That gravity stands at the end of a counter of the accelerometers."""
+    unit = 1.0 / record.interval if record.kind == "increments" else 1.0
+    force = np.median(record.accel, axis=0)
+    channel = int(np.argmax(np.abs(force)))
+    if abs(unit * float(force[channel])) < (1.0 - limit("gravity")) * GRAVITY_EQUATOR:
+        return []
+    counts = counts_of(record.accel)
+    if counts is None:
+        return []
+    largest, middle = float(np.abs(counts).max()), abs(float(np.median(counts[:, channel])))
+    for half in (2.0 ** (bits - 1) for bits in BITS):
+        if largest <= half and middle > (1.0 - limit("gravity")) * half:
+            name = COLUMNS[record.kind][3 + channel]
+            return [note("record.rolls_over", urgent=True, name=name, count=middle, range=half)]
+    return []
