@@ -8,8 +8,8 @@ attitude, biases, lever arm and motion together, twice: the second time about th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -20,22 +20,22 @@ from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.late_gyros import response_to_late_gyros
 from truenorth.alignment.matched import innovations_of, matched
-from truenorth.alignment.motion_fit import search, with_guess
-from truenorth.alignment.motion_likelihood import Series, Walks
+from truenorth.alignment.motion_filter import MotionFilter, SwingFilter
+from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
 from truenorth.alignment.sway_noise import noisier_sensors
 from truenorth.alignment.swing import may_swing, swings
-from truenorth.alignment.swing_fit import ARM, fit_swing
+from truenorth.alignment.swing_fit import ARM
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse import oba
 from truenorth.coarse.uncertainty import detrended, own_motion
 from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
-from truenorth.errors.staying import PHI, QUIETEST_BASE
-from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
-from truenorth.estimate.batch import Filtered, in_sigmas, settle
+from truenorth.errors.staying import PHI
+from truenorth.errors.sway import AxisMotion
+from truenorth.estimate.batch import settle
 from truenorth.estimate.staying import Prior, StayingLog, prior_of
-from truenorth.filters import LinearSystem, kalman
+from truenorth.filters import LinearSystem
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, integrate
@@ -46,8 +46,6 @@ WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
 FILTER_PASSES = 24  # of gyros with a bias of some earth rates that turn on an indexer; the others settle in five
-STALE = 1.0  # sigmas: an attitude that is off by more leaves its own error in what the motion is fitted to
-MOST_FITS = 12  # passes, about attitudes like that
 FITS = 5  # of the motion, one a pass: another would make 13 of 14 logs no likelier
 
 
@@ -72,7 +70,7 @@ class SwayAlignment(FineAlignment):
     """What the last pass of the filter left; see :class:`FineAlignment`."""
 
     about: StayingLog  # as the last pass was linearised
-    estimator: _MotionFilter  # that made it
+    estimator: MotionFilter  # that made it
     arm: Array  # (3,) m
     arm_sigma: Array  # (3,) m
     misfit_at: Callable[[Position], float]  # how badly the log fits another place: :func:`misfit_at`
@@ -116,86 +114,6 @@ class _Fitted:
 
     end: Array
     residual: Array
-
-
-class _Fits:
-    """Motions fitted to velocities along E, N, U; a velocity that was searched or fitted is not again."""
-
-    def __init__(self, interval: float, walks: Walks) -> None:
-        self.interval, self.walks = interval, walks
-        self.searched: dict[tuple[int, bytes], tuple[Series, AxisMotion]] = {}
-        self.found: dict[tuple[int, bytes, AxisMotion | None], AxisMotion] = {}
-
-    def __call__(self, residual: Array, guesses: Sequence[AxisMotion] | None = None) -> tuple[AxisMotion, ...]:
-        """To a residual (K, 3), from nothing and from guesses; no quieter than bedrock."""
-        return _no_quieter(
-            self._along(axis, residual[:, axis], None if guesses is None else guesses[axis]) for axis in range(3)
-        )
-
-    def _along(self, axis: int, velocity: Array, guess: AxisMotion | None) -> AxisMotion:
-        seen = axis, velocity.tobytes()
-        if seen not in self.searched:
-            series = Series(velocity, self.interval, self.walks)
-            self.searched[seen] = series, search(series, MOST_OSCILLATORS[axis])
-        if (*seen, guess) not in self.found:
-            self.found[*seen, guess] = with_guess(*self.searched[seen], guess)
-        return self.found[*seen, guess]
-
-
-class _MotionFilter:
-    """A Kalman filter whose states hold the base's motion, as fitted to a residual; fitted anew about the first answers.
-
-    And about those that follow, while an answer moves attitude by more than `STALE` sigmas: the error of attitude is in what the
-    motion was fitted to, and the motion explains it away. (Industrial gyros on an indexer of a moored ship: the windowed fit was
-    1.4 deg off in level; fitted once about that, the motion was .5 m/s for .05, twice the log-likelihood 4340 for 6560.)
-    """
-
-    def __init__(self, residual: Array, interval: float, walks: Walks, fits: int = 1) -> None:
-        self.interval, self.walks, self.fits, self.passes = interval, walks, fits, 0
-        self.fit = _Fits(interval, walks)
-        self.motion = self.fit(residual)
-        self.stale = False
-
-    def __call__(self, system: LinearSystem) -> Filtered:
-        self.passes, self.base = self.passes + 1, system
-        # About a good attitude: what was in the first residual besides the motion is gone.
-        if 1 < self.passes <= 1 + self.fits or self.stale:
-            self.motion = self.fit(system.z, self.motion)
-        found = self.filtered()
-        self.stale = self.passes <= MOST_FITS and in_sigmas(PHI)(found) > STALE
-        return found
-
-    def filtered(self) -> Filtered:
-        """With the motion as fitted."""
-        full = self.full()
-        return Filtered(full, kalman(full, history="full"))
-
-    def full(self) -> LinearSystem:
-        """The last system, with the motion as fitted."""
-        return with_motion(self.base, self.interval, self.motion)
-
-    def without(self, seen: Array) -> tuple[float, Array]:
-        """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""
-        left = self.base.with_arrays(z=self.base.z - seen)
-        motion = self.fit(left.z, self.motion)
-        estimates = kalman(with_motion(left, self.interval, motion, spare=False))
-        return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
-
-
-class _SwingFilter(_MotionFilter):
-    """The same of a base that swings on lines, about an attitude that is good already: fitted once."""
-
-    def __init__(self, plain: _MotionFilter, turns: slice) -> None:
-        self.interval, self.walks, self.motion, self.turns = plain.interval, plain.walks, plain.motion, turns
-        self.passes, self.fit = 0, _Fits(self.interval, self.walks)
-
-    def __call__(self, system: LinearSystem) -> Filtered:
-        self.passes, self.base = self.passes + 1, system
-        if self.passes == 1:
-            self.motion = _no_quieter(
-                fit_swing(system, self.interval, self.walks, self.motion, system.H[:, :, self.turns])
-            )
-        return self.filtered()
 
 
 def sway_align(
@@ -251,7 +169,7 @@ def swinging(plain: SwayAlignment, start: CoarseStart, mount: Mount, turned: Imu
         C_sb=mount.C_sb,
         taken=np.append(log.taken, np.zeros(len(prior.mean) - len(log.taken))),
     )
-    swung = _filtered(on_lines, _SwingFilter(plain.estimator, prior.groups["slow arm"]), plain.misfit_at)
+    swung = _filtered(on_lines, SwingFilter(plain.estimator, prior.groups["slow arm"]), plain.misfit_at)
     believed = swings(swung, swung.motion, plain, lambda: plain.begun, position) and not swung.suspect()
     return swung if believed else plain
 
@@ -265,23 +183,23 @@ def misfit_at(start: CoarseStart, mount: Mount, turned: ImuSpec | None, position
     """
     C_n0_i = oba(integrate(start.record, start.interval), position.lat, position.alt, history=False).C_n0_i
     log, estimator = _with_motion(start._replace(C_n0_i=C_n0_i, position=position), mount, turned, FITS)
-    last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=1 + FITS)
+    last = settle(log, estimator, estimator.moved, most=FILTER_PASSES, least=1 + FITS)
     return -2.0 * float(last.found.estimates.log_likelihood)
 
 
 def _with_motion(
     start: CoarseStart, mount: Mount, turned: ImuSpec | None, fits: int = 1
-) -> tuple[StayingLog, _MotionFilter]:
+) -> tuple[StayingLog, MotionFilter]:
     """A log about its windowed fit, and the filter with the motion that the fit leaves."""
     log, residual = _settled(start, mount, turned)
     model, position = start.model, start.position
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * gravity_of_place(position.lat, position.alt))
-    return log, _MotionFilter(residual, float(np.mean(log.integrals.intervals)), walks, fits)
+    return log, MotionFilter(residual, float(np.mean(log.integrals.intervals)), walks, fits)
 
 
-def _filtered(log: StayingLog, estimator: _MotionFilter, misfit: Callable[[Position], float]) -> SwayAlignment:
+def _filtered(log: StayingLog, estimator: MotionFilter, misfit: Callable[[Position], float]) -> SwayAlignment:
     """The log about its last pass."""
-    last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
+    last = settle(log, estimator, estimator.moved, most=FILTER_PASSES, least=2)
     position, arm = log.position, log.prior.groups["arm"]
     # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
     seen = own_motion(log.integrals, log.C_n0_i, position.lat, position.alt)
@@ -371,8 +289,3 @@ def _prior(start: CoarseStart, mount: Mount, turned: ImuSpec | None, slow_arm: f
         offset_sigma=mount.offset_sigma,
         slow_arm_sigma=slow_arm,
     )
-
-
-def _no_quieter(motion: Iterable[AxisMotion]) -> tuple[AxisMotion, ...]:
-    """The same motions, no quieter than bedrock."""
-    return tuple(replace(item, white=max(item.white, QUIETEST_BASE)) for item in motion)
