@@ -134,3 +134,18 @@ def test_a_ramp_of_the_east_gyro_on_a_still_base_shows_in_its_rate() -> None:
     assert sound.status == "aligned"
     assert not any(item.key == "bias.gyro_steps" for item in sound.evidence)
     assert abs(float(misses(sound, truth)["heading"][0])) < 4.0
+
+
+@pytest.mark.parametrize("hertz", [10.0125, 9.9875, 14.3])
+def test_a_generator_near_a_whole_number_of_periods_a_second_is_no_step_of_a_bias(hertz) -> None:
+    """.013 deg at 10.01 Hz: from second to second attitude goes round in 80 s, which was "2 deg/h near 254 s"."""
+    inputs, truth = BENCHES["still"].draw(4401, 2)
+    record = inputs["record"]
+    roll = np.radians(0.013) * np.sin(2.0 * np.pi * hertz * record.time)
+    turned = np.diff(roll, prepend=roll[:1])[:, None] * [0.0, 1.0, 0.0]
+    shaken = np.cross(roll[:, None] * [0.0, 1.0, 0.0], record.accel)
+    answer = align(
+        replace(record, gyro=record.gyro + turned, accel=record.accel - shaken), inputs["place"], inputs["imu"]
+    )
+    assert answer.status == "aligned", answer.reasons
+    assert abs(float(misses(answer, truth)["heading"][0])) < 4.0
