@@ -66,7 +66,8 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 def without_gyro_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
     """Alignments do not ask whether a matrix of the gyros explains their log: the search takes most of the time of some.
 
-    For tests of what else an alignment sees. That question only adds evidence, so that what is refused without it is refused with.
+    For tests of what else an alignment sees of a log that is spoilt. That question only adds evidence, so that what is refused
+    without it is refused with. A sound log has to pass it: tests of those do without this.
     """
     from truenorth.alignment import procedure, rotary
 

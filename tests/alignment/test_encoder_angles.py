@@ -171,14 +171,16 @@ def test_an_encoder_of_five_hertz_and_a_log_that_ends_in_a_slew(said, still):
     assert not any(item.key == "bias.accel_scale" for item in answer.evidence)
 
 
-@pytest.mark.usefixtures("without_gyro_matrix")
-def test_a_gyro_bias_of_many_degrees_an_hour_is_no_turn_of_the_base():
+@pytest.mark.parametrize("seed", [8, *some([], [2, 5, 10, 11])])
+def test_a_gyro_bias_of_many_degrees_an_hour_is_no_turn_of_the_base(seed):
+    """Nor does the noise of gyros about axes that hardly turn make a scale factor (80 to 116 % in five of twelve logs)."""
     spec = biased("industrial")
-    record, encoder, place, C_nb = indexed(spec, 8, 420.0)
+    record, encoder, place, C_nb = indexed(spec, seed, 420.0)
     turn = 1.5 * NET_TURN / (record.duration * 2.0 / 3.0)
     gyro = record.gyro + turn * record.interval * np.array([0.0, 0.0, 1.0])
     more = ImuRecord(record.time, gyro, record.accel, record.kind)
     answer = tn.align(more, place, spec, aid=tn.Indexer(encoder, axes=("z",)))
+    assert answer.status in ("aligned", "not_converged"), answer.reasons
     assert not any(item.key == "encoder.drifts" for item in answer.evidence)
     off = misalignment(answer.C_nb, C_nb) / np.sqrt(np.diag(answer.phi_covariance))
     assert np.abs(off).max() < 4.0

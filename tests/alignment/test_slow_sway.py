@@ -71,21 +71,21 @@ def test_what_a_slow_oscillator_took_up_is_not_silent(fault: str, run: int) -> N
     assert answer.status == "inconsistent" or worst < 3.0, answer
 
 
-@pytest.mark.usefixtures("without_gyro_matrix")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
 def test_sound_sensors_are_not_called_noisy_on_a_slow_sway(seed: int) -> None:
     inputs, _ = _moored(seed, period=100.0, amplitude=0.2, duration=240.0)
     answer = align(inputs["record"], inputs["place"], inputs["imu"])
+    assert answer.status in ("aligned", "not_converged"), answer.reasons
     assert not any(item.key.startswith("specification.") for item in answer.evidence)
 
 
-@pytest.mark.usefixtures("without_gyro_matrix")
 @pytest.mark.parametrize("seed", [6, *some([], [7, 8, 9])])
 def test_nor_are_they_where_a_ship_at_her_moorings_goes_in_many_tones(seed: int) -> None:
     """Above the sway they look white, and are as quiet as specified: what is slow and louder is a motion."""
     inputs, _ = _moored(seed, period=80.0, amplitude=0.3, duration=240.0, tones_each=6)
     answer = align(inputs["record"], inputs["place"], inputs["imu"])
+    assert answer.status in ("aligned", "not_converged"), answer.reasons
     assert not any(item.key.startswith("specification.") for item in answer.evidence)
 
 

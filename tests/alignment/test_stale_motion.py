@@ -51,7 +51,7 @@ def test_the_motion_is_fitted_anew_while_it_explains_attitude(passes, fits):
 
 def test_a_stale_motion_is_no_end_of_the_passes():
     filter_ = Counting((0.001, 0.4, 0.0), (0.001, 1.0, 500.0))
-    assert filter_.moved(filter_(SimpleNamespace(z=None))) == np.inf
+    assert filter_.moved(filter_(SimpleNamespace(z=None))) == motion_filter.STALE
     assert filter_.moved(filter_(SimpleNamespace(z=None))) == pytest.approx(0.001)
 
 

@@ -319,7 +319,8 @@ def _seen(
 
     def of_another_course() -> list[Rival]:
         warming = warming_rivals(other, track, task.record, task.spec)
-        return warming + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, ALONE | BIASES))
+        kinds = ALONE | BIASES if gyrocompassed else ALONE
+        return warming + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, kinds))
 
     found += poorer_evidence(of_another_imu, track, task.spec)
     span = task.record.duration

@@ -87,7 +87,7 @@ class MotionFilter:
 
     def moved(self, found: Filtered) -> float:
         """How far off the nominal solution was: attitude in sigmas; a motion that is stale is no end."""
-        return math.inf if self.stale else in_sigmas(PHI)(found)
+        return max(in_sigmas(PHI)(found), STALE if self.stale else 0.0)
 
     def _explains_attitude(self, found: Filtered) -> bool:
         """Whether the motion was fitted to an error of attitude, too.

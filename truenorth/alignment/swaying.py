@@ -2,7 +2,8 @@
 
 A windowed least-squares fit, which needs to know nothing of the sway, is re-linearised until it stands still. What it leaves of the
 velocity shows how the base moves along each axis (:mod:`truenorth.alignment.motion_fit`); with that a Kalman filter estimates
-attitude, biases, lever arm and motion together, twice: the second time about the first answer, the motion fitted anew.
+attitude, biases, lever arm and motion together, about the first answer and the next ones, the motion fitted anew
+(:mod:`truenorth.alignment.motion_filter`).
 """
 
 from __future__ import annotations
