@@ -49,7 +49,7 @@ def test_a_turn_on_a_sway_is_found_and_refused(seed, run, degrees):
 
 @pytest.mark.slow
 def test_a_turn_of_which_a_fitted_motion_takes_up_a_part_is_refused():
-    """The log is likelier by 1000 with what is found, at the truth by 1600: the figure is short by up to a third, the verdict stands."""
+    """Likelier by 1000 with what is found, at the truth by 1600: the figure is short by up to a third, the verdict stands."""
     degrees = [0.0, -0.06, -0.6]
     inputs, _ = BENCHES["swaying"].draw(52, 7)
     answer = BENCHES["swaying"].align(inputs | {"record": turned(inputs["record"], degrees)})
@@ -99,7 +99,7 @@ def test_waves_that_carry_a_ship_as_they_roll_her_turn_no_gyros(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("in_doubt", [False, True])
 def test_what_may_be_a_push_as_well_is_in_sigma(in_doubt, monkeypatch):
-    """38 sigmas of heading, `aligned`, before. A push would explain some per cent of the turn; where that is doubt, it is in sigma."""
+    """38 sigmas of heading, `aligned`, before. A push would explain some per cent of it; where that is doubt, it is in sigma."""
     if in_doubt:
         monkeypatch.setattr(gyro_matrix, "limit", lambda name: 0.01 if name == "pushed in step" else limit(name))
     inputs, truth = BENCHES["swaying"].draw(12, 0)
