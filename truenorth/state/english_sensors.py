@@ -39,6 +39,10 @@ OF_SENSORS = {
         "gyros hum as on a cone, and the accelerometers show no tilt of it: no motion, but a drift of {drift:deg/h|} deg/h; "
         "heading by {heading:angle}, level by {level:angle}"
     ),
+    "record.line": (
+        "accelerometers show a line from 5 Hz on, and the gyros no turn that explains it: a vibration, or a hum that is no motion; "
+        "velocity at a row may be off by {size:.2g} m/s (RMS)"
+    ),
     "record.alternates": (
         "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
         "their mean is turned against either by {level:angle}"
