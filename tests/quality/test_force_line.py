@@ -57,7 +57,7 @@ def test_a_log_too_short_or_too_slow_says_nothing():
 
 
 @pytest.mark.slow
-def test_a_hum_of_the_accelerometers_is_in_the_sigma_of_velocity():
-    """Of seed 323, as of others, some were beyond three sigmas of velocity."""
-    trials = run_faults(["navigate"], ["hum", "none"], runs=12, seed=323)
+def test_a_hum_on_the_move_is_in_sigma():
+    """Of seed 303 three were beyond three sigmas: one of velocity, and two of level, whose gyros hum."""
+    trials = run_faults(["navigate"], ["hum", "none"], runs=12, seed=303)
     assert [t for t in trials if t.outcome in ("silent", "crash")] == []
