@@ -8,7 +8,7 @@ from truenorth.aiding.aids import Odometer
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.campaign.faults import run_faults
-from truenorth.quality.rounding import rounding_walks, with_held_rounding, with_rounding
+from truenorth.quality.rounding import rounding_walks, with_rounding
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
 
@@ -82,9 +82,10 @@ def test_a_specification_that_counts_is_left_as_it_is() -> None:
     rng = np.random.default_rng(14)
     record = _record(np.round(0.3 * rng.standard_normal(ROWS)))
     plain = imu_spec("tactical")
-    assert with_rounding(plain, record).accel_random_walk > plain.accel_random_walk
     counter = imu_spec({**plain.to_mapping(), "accel": {**plain.to_mapping()["accel"], "quantisation": "0.01 m/s"}})
-    assert with_rounding(counter, record) == counter
+    for aided in (True, False):
+        assert with_rounding(plain, record, aided=aided).accel_random_walk > plain.accel_random_walk
+        assert with_rounding(counter, record, aided=aided) == counter
 
 
 @pytest.mark.parametrize(("run", "steps"), some([(16, 1.16)], [(1, 1.04)]))
@@ -106,16 +107,17 @@ def test_what_is_held_and_what_is_white_make_the_walk() -> None:
     """At the end of a log of one regime a bias and white noise leave what the walk does; a sensor without a step is as it was."""
     rng, spec = np.random.default_rng(16), imu_spec("tactical")
     record = _record(np.round(0.3 + 0.2 * rng.standard_normal(ROWS)))
-    walk, held, time = rounding_walks(record)[1], with_held_rounding(spec, record), ROWS / RATE
+    walk, held, time = rounding_walks(record)[1], with_rounding(spec, record), ROWS / RATE
     white, bias = (
         np.sqrt(getattr(held, name) ** 2 - getattr(spec, name) ** 2) for name in ("accel_random_walk", "accel_bias")
     )
     assert white == pytest.approx(1.0 / np.sqrt(12.0 * RATE))
     assert white**2 * time + (bias * time) ** 2 == pytest.approx(walk**2 * time, rel=0.01)
-    assert held.accel_rate_random_walk > spec.accel_rate_random_walk
+    walks = held.accel_rate_random_walk**2 - spec.accel_rate_random_walk**2
+    assert walks * time == pytest.approx(2.0 * bias**2, rel=0.01)  # two regimes are independent
     assert (held.gyro_bias, held.gyro_random_walk) == (spec.gyro_bias, spec.gyro_random_walk)
     fine = _record(rng.standard_normal(ROWS))
-    assert with_held_rounding(spec, fine) == spec
+    assert with_rounding(spec, fine) == spec
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.record_evidence import moving_evidence
-from truenorth.quality.rounding import with_held_rounding
+from truenorth.quality.rounding import with_rounding
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
@@ -146,9 +146,7 @@ def align_transfer(
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
     if flexure is not None and not what.attitude:
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
-    spec = noise_in(slave, with_held_rounding(imu_spec("industrial" if imu is None else imu), slave)).with_coning_of(
-        slave
-    )
+    spec = noise_in(slave, with_rounding(imu_spec("industrial" if imu is None else imu), slave)).with_coning_of(slave)
     where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
     slave = bridged(corrected(slave, spec, calibration))
 

@@ -164,7 +164,8 @@ def navigate(
     if damping is not None or answer.status != "inconsistent":
         return answer
     log, spec = ImuRecord.of(record), start_of(start, imu)[1]
-    return as_noisy_as_its_rows(answer, log, seen_in(with_rounding(spec, log), log), lambda other: by(imu=other))
+    spec = seen_in(with_rounding(spec, log, aided=bool(by_key(aid))), log)
+    return as_noisy_as_its_rows(answer, log, spec, lambda x: by(imu=x))
 
 
 def _by_specification(
@@ -195,7 +196,7 @@ def _by_specification(
     record = _from_start(corrected(log, spec, calibration), begin)
     check_start_at_rest(begin, record)
     record, gaps, disturbances = bridge_gaps(record)
-    noise = seen_in(with_rounding(spec, log), record)
+    noise = seen_in(with_rounding(spec, log, aided=bool(given) and damping is None), record)
     said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
@@ -277,9 +278,8 @@ def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
     evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
     receiver = record_of(given, Gnss)
     evidence += [] if receiver is None else gnss_evidence(receiver)
-    if "baro" in given and plan.altitude != "baro":
-        evidence.append(note("height.barometer_unused", "use_barometer", altitude=plan.altitude))
-    return evidence
+    unused = "baro" in given and plan.altitude != "baro"
+    return [*evidence, *([note("height.barometer_unused", "use_barometer", altitude=plan.altitude)] if unused else [])]
 
 
 def _rivals(

@@ -103,9 +103,20 @@ def _window(record: ImuRecord) -> int:
 def hum_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
     """What a hum of the gyros does to a base that stays at a latitude (rad)."""
     drift, turn = hum_of(record)
+    return _evidence(
+        drift, math.hypot(float(np.linalg.norm(drift)) / max(EARTH_RATE * math.cos(lat), 1e-12), turn), turn
+    )
+
+
+def moving_hum_evidence(record: ImuRecord) -> list[Evidence]:
+    """What it does to the attitude at a row of a base that moves; its drift is a bias, which aids show."""
+    drift, turn = hum_of(record)
+    return _evidence(drift, turn, turn)
+
+
+def _evidence(drift: Array, heading: float, turn: float) -> list[Evidence]:
     size = float(np.linalg.norm(drift))
     if max(size, turn * EARTH_RATE) < LEAST:
         return []
-    effect = Effect(math.hypot(size / max(EARTH_RATE * math.cos(lat), 1e-12), turn), turn)
-    figures: dict[str, Figure] = {"drift": size, "heading": effect.heading, "level": turn}
-    return [Evidence("record.hum", figures, "known", effect, ("source",))]
+    figures: dict[str, Figure] = {"drift": size, "heading": heading, "level": turn}
+    return [Evidence("record.hum", figures, "known", Effect(heading, turn), ("source",))]

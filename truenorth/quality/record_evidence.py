@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from truenorth.quality.alternation import alternation_evidence
 from truenorth.quality.codes import codes_evidence
-from truenorth.quality.hum import hum_evidence
+from truenorth.quality.force_line import line_evidence
+from truenorth.quality.hum import hum_evidence, moving_hum_evidence
 from truenorth.quality.plausibility import unit_findings
 from truenorth.quality.quantum import quantum_evidence
 from truenorth.quality.regimes import MotionSummary
@@ -75,7 +76,8 @@ def staying_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
 
 def moving_evidence(record: ImuRecord) -> list[Evidence]:
     """Evidence of a record on the move; of noise for a while see :func:`truenorth.estimate.rivals.noise_evidence`."""
-    return vibration_evidence(record) + sampling_evidence(record, turns=True) + codes_evidence(record)
+    found = vibration_evidence(record) + sampling_evidence(record, turns=True)
+    return found + codes_evidence(record) + line_evidence(record) + moving_hum_evidence(record)
 
 
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:

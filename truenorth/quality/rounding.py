@@ -1,17 +1,22 @@
-"""What rounding leaves in the integrals of a sensor on the move: a random walk, or white noise and a bias that changes.
+"""What rounding leaves in the integrals of a sensor on the move: white noise and a bias that changes, or a random walk.
 
 A row that is rounded to steps of q, and whose remainder is lost, is off by an error of variance ``q^2 / 12``. Noise or motion of
 more than a step makes it white. Where less goes on it stays as it is, as long as the sensor stays where it is: of a sine of
 amplitude A a mean error of at most ``(q / pi) |J_0(2 pi A / q)|`` is left, of noise of sigma s it has ``exp(-2 pi^2 s^2 / q^2)``
 of that. A regime is a time in which the mean stays between the same two steps; its error acts over all of it.
 
-Of one variance at the end of a log, a walk forgets in seconds what a bias holds for a regime. A master whose attitude comes ten
-times a second shows a bias, and a walk as large hides its delay: that of a slave was 27 ms off, and its seat 8 sigmas.
+Errors of regimes that last T on the average are independent, so that they are correlated as ``exp(-t/T)``: a Gauss-Markov process
+of that size h. What measures velocity or position sees it within a regime; there it is a bias, which from one regime to the next
+moves by ``sqrt(2) h``, as a random walk of the bias of density ``h sqrt(2/T)`` does. What nothing aids integrates over many
+regimes; there it is forgotten, and white noise of density ``h sqrt(T)``, as regimes are of one length. Each way is wrong at the
+other's place. A walk of that size is many times the noise of the sensor: aids that come within a regime were worth little against
+it, and a master's attitude ten times a second hid the delay of a slave (27 ms off, its seat 8 sigmas).
 
 A counter that carries the remainder on loses nothing: the error of its rows is the difference of white noise, so that the floor of
 its spectrum, between the lines of a vibration, falls towards low frequencies. That of lost remainders does not.
 
-Source: B. Widrow and I. Kollar, *Quantization Noise*, Cambridge 2008, ch. 4 and appendix G (Gaussian and sine waves).
+Source: B. Widrow and I. Kollar, *Quantization Noise*, Cambridge 2008, ch. 4 and appendix G (Gaussian and sine waves);
+A. Gelb (ed.), *Applied Optimal Estimation*, 1974, sec. 3.8 (a Gauss-Markov process and its limits).
 """
 
 from __future__ import annotations
@@ -41,18 +46,34 @@ LARGE = 4.0  # steps: motion that is larger passes over all places between two s
 LOWEST = 4  # lines of a spectrum that the slow motion of a vehicle fills
 
 
-def with_rounding(spec: ImuSpec, record: ImuRecord) -> ImuSpec:
-    """The specification with random walks of what lost remainders leave; as it is for sensors that it says to be counters.
+def with_rounding(spec: ImuSpec, record: ImuRecord, *, aided: bool = True) -> ImuSpec:
+    """The specification with what lost remainders leave; as it is for sensors that it says to be counters.
 
     Parameters
     ----------
     spec : ImuSpec
     record : ImuRecord
         As it was logged: neither corrected nor bridged.
+    aided : bool
+        Velocity or position is measured within a regime: white noise, and biases that change from regime to regime. Else random
+        walks of the same variance at the end.
     """
-    gyro, accel = rounding_walks(record)
-    counts = spec.gyro_quantisation > 0.0, spec.accel_quantisation > 0.0
-    return spec.with_more_noise(0.0 if counts[0] else gyro, 0.0 if counts[1] else accel)
+    if not aided:
+        gyro, accel = rounding_walks(record)
+        counts = spec.gyro_quantisation > 0.0, spec.accel_quantisation > 0.0
+        return spec.with_more_noise(0.0 if counts[0] else gyro, 0.0 if counts[1] else accel)
+    scale, unit = (record.interval, 1.0) if record.kind == "rates" else (1.0, 1.0 / record.interval)
+    more: dict[str, Any] = {}
+    for name, lost in zip(("gyro", "accel"), _of_sensors(record), strict=True):
+        if getattr(spec, f"{name}_quantisation") > 0.0 or lost.walk == 0.0:
+            continue
+        held = {
+            "random_walk": scale * lost.white / math.sqrt(record.interval),
+            "bias": unit * lost.held,
+            "rate_random_walk": unit * lost.held * math.sqrt(2.0 / (lost.rows * record.interval)),
+        }
+        more |= {f"{name}_{key}": math.hypot(getattr(spec, f"{name}_{key}"), size) for key, size in held.items()}
+    return replace(spec, **more)
 
 
 def rounding_walks(record: ImuRecord) -> tuple[float, float]:
@@ -66,29 +87,6 @@ def rounding_walks(record: ImuRecord) -> tuple[float, float]:
     scale = record.interval if record.kind == "rates" else 1.0
     gyro, accel = (scale * x.walk / math.sqrt(record.interval) for x in _of_sensors(record))
     return gyro, accel
-
-
-def with_held_rounding(spec: ImuSpec, record: ImuRecord) -> ImuSpec:
-    """The specification with white noise of rounding, and with biases that change from regime to regime.
-
-    Parameters
-    ----------
-    spec : ImuSpec
-    record : ImuRecord
-        As it was logged: neither corrected nor bridged.
-    """
-    scale, unit = (record.interval, 1.0) if record.kind == "rates" else (1.0, 1.0 / record.interval)
-    more: dict[str, Any] = {}
-    for name, lost in zip(("gyro", "accel"), _of_sensors(record), strict=True):
-        if getattr(spec, f"{name}_quantisation") > 0.0 or lost.walk == 0.0:
-            continue
-        held = {
-            "random_walk": scale * lost.white / math.sqrt(record.interval),
-            "bias": unit * lost.held,
-            "rate_random_walk": unit * lost.held / math.sqrt(lost.rows * record.interval),
-        }
-        more |= {f"{name}_{key}": math.hypot(getattr(spec, f"{name}_{key}"), size) for key, size in held.items()}
-    return replace(spec, **more)
 
 
 class Lost(NamedTuple):

@@ -110,8 +110,17 @@ def share_of_increments(x: Array) -> Array:
     return np.asarray(np.square(0.5 * x / np.sin(0.5 * x)))
 
 
+def integrated(x: Array, kind: str) -> Array:
+    """What the sums of rows make of the integral of tones that turn by x rad in an interval, as a share of it."""
+    return np.abs(_by_rule(x)) if kind == "rates" else 0.5 * x / np.sin(0.5 * x)
+
+
 def share_left(x: Array) -> Array:
     """Share of the drift of a cone that the mechanisation makes too much, of tones that turn by x rad an interval."""
+    return np.asarray(np.abs(_by_rule(x)) ** 2 * np.sin(x) * (1.0 + (1.0 - np.cos(x)) / 3.0) / x - 1.0)
+
+
+def _by_rule(x: Array) -> NDArray[np.complex128]:
+    """H of the module's text."""
     z = np.exp(-1j * x)
-    H = 1j * x * (5.0 + 8.0 * z - z * z) / (12.0 * (1.0 - z))
-    return np.asarray(np.abs(H) ** 2 * np.sin(x) * (1.0 + (1.0 - np.cos(x)) / 3.0) / x - 1.0)
+    return np.asarray(1j * x * (5.0 + 8.0 * z - z * z) / (12.0 * (1.0 - z)))

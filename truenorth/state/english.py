@@ -1,6 +1,8 @@
-"""English: a sentence for each piece of evidence."""
+"""English: a sentence for each piece of evidence; those of logs and sensors stand in a file of their own."""
 
 from __future__ import annotations
+
+from truenorth.state.english_sensors import OF_SENSORS
 
 SENTENCES = {
     "text": "{text}",
@@ -45,6 +47,15 @@ SENTENCES = {
     "latitude.assumed": (
         "the latitude was not given: {lat:deg|.0f} deg assumed; gyros as poor, or a log as short, do not see the difference"
     ),
+    "aids.late": "the vehicle drives for {waited:.0f} s before anything aids: the log is used from then on",
+    "answers.differ": (
+        "the method that the library chooses finds another attitude in the same logs: heading differs by {heading:angle}, level by "
+        "{level:angle}, {sigmas:.1f} times what both sigmas allow"
+    ),
+    "answers.tight": (
+        "this method claims more than the one that the library chooses finds in the same logs: heading {heading:angle}, "
+        "level {level:angle} are added to sigma"
+    ),
     # ---- a base that stays, against earth and gravity
     "base.moves": "the base does not stay where it is: it moves from {until:.1f} s on",
     "base.stays": (
@@ -52,6 +63,7 @@ SENTENCES = {
         "and the log would not show it"
     ),
     "base.unsettled": "re-linearisation did not settle: the log does not look like that of a base that stays where it is",
+    "base.fast": "a base that stays would move with {speed:.3g} m/s RMS",
     "drift.step": (
         "the base drifts {axis:term}: from about {onset:.0f} s on its velocity shows a step to {velocity:.2g} m/s (likelihood "
         "ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
@@ -87,198 +99,6 @@ SENTENCES = {
         "the table was touched, or an accelerometer's offset jumped, at about {time:.0f} s: the level specific force steps by "
         "{step:mg|.2g} mg (as a tilt of {tilt:angle} would make it; usual {usual:mg|.2g} mg), and the gyros show no turn"
     ),
-    # ---- the record itself
-    "record.saturated": "{text}",
-    "record.constant_channel": "{text}",
-    "record.rows_again": "{text}",
-    "record.gyro_unit": "{text}",
-    "record.accel_unit": "{text}",
-    "record.accel_level": "{text}",
-    "record.no_gravity": "{text}",
-    "record.repeated_rows": "{text}",
-    "record.no_noise": "{text}",
-    "record.frozen": "{text}",
-    "record.gaps": "{text}",
-    "record.jitter": "{text}",
-    "record.vibration": (
-        "vibration that rows at {rate:.4g} Hz hardly sample turns the attitude at the last one by {size:angle} (one sigma), and "
-        "its coning is a gyro bias of {drift:deg/h|.2g} deg/h: log increments, or more rows a second"
-    ),
-    "record.time_unit": "{text}",
-    "record.reordered_rows": "{text}",
-    "record.clock_jumps": (
-        "the log has {count:d} gap(s) of {lost:.2f} s in all, and fits the measurements better without them (likelihood ratio "
-        "{ratio:.0f}): its clock has jumped, no rows are lost"
-    ),
-    "tilt.axes": (
-        "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "
-        "gyro columns x y z read as {axes}"
-    ),
-    "response.gyros_late": (
-        "gyros {delay:.4f} s late against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
-        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
-    ),
-    "response.gyros_early": (
-        "gyros {delay:.4f} s early against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
-        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
-    ),
-    "axes.half_turn": (
-        "gyros turned by half a turn about the vertical, x and y reversed, fit the measurements better (likelihood ratio "
-        "{ratio:.0f}, chance gives {chance:.0f} at most): gyros and accelerometers have other axes"
-    ),
-    "heave.delay": (
-        "gyros {delay:+.3f} ± {sigma:.3f} s late fit the slow vertical motion better (likelihood ratio {ratio:.0f}, chance gives "
-        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
-    ),
-    "tilt.gyros_late": "the gyros are {delay:.3f} s late against the accelerometers, by how gravity turns in these",
-    "tilt.gyros_early": "the gyros are {delay:.3f} s early against the accelerometers, by how gravity turns in these",
-    "tilt.scale": "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers",
-    "tilt.turned": "axes of the gyros are off by {turn:angle} ± {sigma:angle} against the accelerometers, by how gravity swings",
-    "bias.gyro": (
-        "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu:imu}) allows {allowed:deg/h|} deg/h"
-    ),
-    "bias.accel": (
-        "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:imu}) allows {allowed:ug|} ug"
-    ),
-    "bias.together": (
-        "the {count} biases that the measurements show are together {factor:.1f} times as large as the specification ({imu:imu}) "
-        "allows"
-    ),
-    "aids.late": "the vehicle drives for {waited:.0f} s before anything aids: the log is used from then on",
-    "answers.differ": (
-        "the method that the library chooses finds another attitude in the same logs: heading differs by {heading:angle}, level by "
-        "{level:angle}, {sigmas:.1f} times what both sigmas allow"
-    ),
-    "answers.tight": (
-        "this method claims more than the one that the library chooses finds in the same logs: heading {heading:angle}, "
-        "level {level:angle} are added to sigma"
-    ),
-    "bias.accel_scale": (
-        "the {axis} accelerometer reads {scale:+.1%} ± {sigma:.1%} too much (likelihood ratio {ratio:.0f}); heading moves by "
-        "{heading:angle}, level by {level:angle}"
-    ),
-    "bias.gyro_steps": (
-        "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
-        "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "bias.accel_steps": (
-        "the {axis} accelerometer's bias changes by about {size:ug|} ug near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
-        "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "rival.gyro_wanders": (
-        "gyro biases that change by some {size:deg/h|} deg/h over the log fit the measurements better than those of the "
-        "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
-        "by {level:angle}"
-    ),
-    "rival.accel_wanders": (
-        "accelerometer biases that change by some {size:ug|} ug over the log fit the measurements better than those of the "
-        "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
-        "by {level:angle}"
-    ),
-    "rival.accels_warm_up": (
-        "accelerometer biases that move together by up to {size:ug|} ug, as sensors that warm up within {time:.0f} s, fit the "
-        "measurements better (as rare by chance as a likelihood ratio of {ratio:.0f}, a sound log gives {chance:.0f} at most); "
-        "heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "rival.spikes": (
-        "{count} single rows of the IMU stand out of their neighbours; with values between these neighbours instead the "
-        "measurements fit as well or better (likelihood ratio {ratio:.3g}); heading moves by {heading:angle}, "
-        "level by {level:angle}"
-    ),
-    "rival.poorer": (
-        "an IMU {factor:.0f} times as poor as the specification fits the measurements as well (likelihood ratio {ratio:.3g}); "
-        "heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "rival.scale_factors": (
-        "scale factors {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
-        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "rival.gyro_biases": (
-        "gyro biases {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
-        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "rival.misalignments": (
-        "misalignments {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
-        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "delay.gyros_late": (
-        "gyros taken {delay:.3f} s earlier fit the measurements better (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at "
-        "most): they are late against the accelerometers; heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "delay.gyros_early": (
-        "gyros taken {delay:.3f} s later fit the measurements better (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at "
-        "most): they are early against the accelerometers; heading moves by {heading:angle}, level by {level:angle}"
-    ),
-    "noise.gyro_stretch": (
-        "the gyros are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
-    ),
-    "noise.accel_stretch": (
-        "the accelerometers are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
-    ),
-    "record.coarse": (
-        "{name} is written in steps of {step:.3g}, which hide its noise: its mean may be off by a part of a step; heading by "
-        "{heading:angle}, level by {level:angle}"
-    ),
-    "record.codes": "{name} is {value:.4g} in {rows} rows and no other from {from:.4g} to {to:.4g}: missing codes, or a dead band",
-    "record.spikes": (
-        "{count} single rows of {name} stand out to one side, and the rows around them show no motion: errors of the log, not "
-        "knocks; heading by {heading:angle}, level by {level:angle}"
-    ),
-    "record.hum": (
-        "gyros hum as on a cone, and the accelerometers show no tilt of it: no motion, but a drift of {drift:deg/h|} deg/h; "
-        "heading by {heading:angle}, level by {level:angle}"
-    ),
-    "record.alternates": (
-        "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
-        "their mean is turned against either by {level:angle}"
-    ),
-    "record.in_turn": "one in {rows} rows of accelerometers differs by {size:.3g} m/s^2: sensors in turn, {level:angle} apart",
-    "record.rolls_over": "{name} stands at {count:.0f} of {range:.0f} counts: gravity may have rolled over at a range's end",
-    "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
-    "specification.gyro_noise": (
-        "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "
-        "{said:deg/sqrt(h)|}: it is another sensor's, and so may be what it says of biases"
-    ),
-    "specification.accel_noise": (
-        "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:imu}) says "
-        "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
-    ),
-    "specification.noisier": (
-        "the white noise of the rows (gyros {gyro:deg/sqrt(h)|} deg/sqrt(h), accelerometers {accel:ug/sqrt(Hz)|} ug/sqrt(Hz)) is "
-        "far more than the specification ({imu:imu}) says: a vehicle that vibrates, or another sensor; the answer counts it, and "
-        "such noise hides other errors, as of gyros that are late"
-    ),
-    "specification.suspect": (
-        "the specification ({imu:imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"
-    ),
-    "bias.vertical_steps": (
-        "near {onset:.0f} s the rate about the vertical changes by {size:deg/h|} deg/h and stays so: heading moves by "
-        "{heading:angle}"
-    ),
-    "bias.gravity_drifts": (
-        "gravity moves by {tilt:angle} in the axes of the IMU (likelihood ratio {ratio:.3g}), and the base is still: an "
-        "accelerometer drifts by {moved:ug|.3g} ug, which moves heading by {heading:angle}, or the base tilts as steadily"
-    ),
-    "base.fast": "a base that stays would move with {speed:.3g} m/s RMS",
-    "encoder.turns": (
-        "the base would turn by {given:deg/s|.2g} deg/s RMS with these angles of the indexer, and by {best:deg/s|.2g} deg/s with "
-        "{reading:term}"
-    ),
-    "encoder.drifts": (
-        "with these angles of the indexer the base turns by {net:deg|.0f} deg from the first third of the log to the last "
-        "({rate:deg/s|.2g} deg/s RMS): no base that stays does"
-    ),
-    "encoder.zero": (
-        "the zero of the inner axis' angle is off by {off:deg|+.3f} ± {sigma:deg|.3f} deg, or the encoder is late or early: the "
-        "base would wobble as the outer axis turns"
-    ),
-    "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
-    "gnss.height_drifts": "the GNSS heights drift by {size:.2g} m against the velocities, {rate:+.2g} m/s (ratio {ratio:.0f})",
-    "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
-    "master.turned": (
-        "the master's velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
-    ),
-    "master.velocity": "the master's velocities are not the changes of its positions, whatever way they are turned",
     # ---- measurements against the prediction
     "innovations.rejected": (
         "{name}: {rejected} of {count} measurements rejected: they contradict the track (half of them by more than "
@@ -396,4 +216,5 @@ SENTENCES = {
     "height.free": "height is carried on by velocity alone: no sensor of height is given",
     "height.fixed": "height is held fixed, as at sea",
     "height.barometer_unused": "the barometer is not used: height is {altitude!r}",
+    **OF_SENSORS,
 }

@@ -1,0 +1,194 @@
+"""English: a sentence for each piece of evidence against a log, a sensor or its specification."""
+
+from __future__ import annotations
+
+OF_SENSORS = {
+    # ---- the record itself
+    "record.saturated": "{text}",
+    "record.constant_channel": "{text}",
+    "record.rows_again": "{text}",
+    "record.gyro_unit": "{text}",
+    "record.accel_unit": "{text}",
+    "record.accel_level": "{text}",
+    "record.no_gravity": "{text}",
+    "record.repeated_rows": "{text}",
+    "record.no_noise": "{text}",
+    "record.frozen": "{text}",
+    "record.gaps": "{text}",
+    "record.jitter": "{text}",
+    "record.vibration": (
+        "vibration that rows at {rate:.4g} Hz hardly sample turns the attitude at the last one by {size:angle} (one sigma), and "
+        "its coning is a gyro bias of {drift:deg/h|.2g} deg/h: log increments, or more rows a second"
+    ),
+    "record.time_unit": "{text}",
+    "record.reordered_rows": "{text}",
+    "record.clock_jumps": (
+        "the log has {count:d} gap(s) of {lost:.2f} s in all, and fits the measurements better without them (likelihood ratio "
+        "{ratio:.0f}): its clock has jumped, no rows are lost"
+    ),
+    "record.coarse": (
+        "{name} is written in steps of {step:.3g}, which hide its noise: its mean may be off by a part of a step; heading by "
+        "{heading:angle}, level by {level:angle}"
+    ),
+    "record.codes": "{name} is {value:.4g} in {rows} rows and no other from {from:.4g} to {to:.4g}: missing codes, or a dead band",
+    "record.spikes": (
+        "{count} single rows of {name} stand out to one side, and the rows around them show no motion: errors of the log, not "
+        "knocks; heading by {heading:angle}, level by {level:angle}"
+    ),
+    "record.hum": (
+        "gyros hum as on a cone, and the accelerometers show no tilt of it: no motion, but a drift of {drift:deg/h|} deg/h; "
+        "heading by {heading:angle}, level by {level:angle}"
+    ),
+    "record.line": (
+        "accelerometers show a line from 5 Hz on, and the gyros no turn that explains it: a vibration, or a hum that is no motion; "
+        "velocity at a row may be off by {size:.2g} m/s (RMS)"
+    ),
+    "record.alternates": (
+        "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
+        "their mean is turned against either by {level:angle}"
+    ),
+    "record.in_turn": "one in {rows} rows of accelerometers differs by {size:.3g} m/s^2: sensors in turn, {level:angle} apart",
+    "record.rolls_over": "{name} stands at {count:.0f} of {range:.0f} counts: gravity may have rolled over at a range's end",
+    "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
+    # ---- its sensors, against each other, the measurements and the specification
+    "tilt.axes": (
+        "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "
+        "gyro columns x y z read as {axes}"
+    ),
+    "response.gyros_late": (
+        "gyros {delay:.4f} s late against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
+        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
+    ),
+    "response.gyros_early": (
+        "gyros {delay:.4f} s early against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
+        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
+    ),
+    "axes.half_turn": (
+        "gyros turned by half a turn about the vertical, x and y reversed, fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most): gyros and accelerometers have other axes"
+    ),
+    "heave.delay": (
+        "gyros {delay:+.3f} ± {sigma:.3f} s late fit the slow vertical motion better (likelihood ratio {ratio:.0f}, chance gives "
+        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
+    ),
+    "tilt.gyros_late": "the gyros are {delay:.3f} s late against the accelerometers, by how gravity turns in these",
+    "tilt.gyros_early": "the gyros are {delay:.3f} s early against the accelerometers, by how gravity turns in these",
+    "tilt.scale": "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers",
+    "tilt.turned": "axes of the gyros are off by {turn:angle} ± {sigma:angle} against the accelerometers, by how gravity swings",
+    "bias.gyro": (
+        "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu:imu}) allows {allowed:deg/h|} deg/h"
+    ),
+    "bias.accel": (
+        "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:imu}) allows {allowed:ug|} ug"
+    ),
+    "bias.together": (
+        "the {count} biases that the measurements show are together {factor:.1f} times as large as the specification ({imu:imu}) "
+        "allows"
+    ),
+    "bias.accel_scale": (
+        "the {axis} accelerometer reads {scale:+.1%} ± {sigma:.1%} too much (likelihood ratio {ratio:.0f}); heading moves by "
+        "{heading:angle}, level by {level:angle}"
+    ),
+    "bias.gyro_steps": (
+        "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
+        "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "bias.accel_steps": (
+        "the {axis} accelerometer's bias changes by about {size:ug|} ug near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
+        "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "rival.gyro_wanders": (
+        "gyro biases that change by some {size:deg/h|} deg/h over the log fit the measurements better than those of the "
+        "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
+        "by {level:angle}"
+    ),
+    "rival.accel_wanders": (
+        "accelerometer biases that change by some {size:ug|} ug over the log fit the measurements better than those of the "
+        "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
+        "by {level:angle}"
+    ),
+    "rival.accels_warm_up": (
+        "accelerometer biases that move together by up to {size:ug|} ug, as sensors that warm up within {time:.0f} s, fit the "
+        "measurements better (as rare by chance as a likelihood ratio of {ratio:.0f}, a sound log gives {chance:.0f} at most); "
+        "heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "rival.spikes": (
+        "{count} single rows of the IMU stand out of their neighbours; with values between these neighbours instead the "
+        "measurements fit as well or better (likelihood ratio {ratio:.3g}); heading moves by {heading:angle}, "
+        "level by {level:angle}"
+    ),
+    "rival.poorer": (
+        "an IMU {factor:.0f} times as poor as the specification fits the measurements as well (likelihood ratio {ratio:.3g}); "
+        "heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "rival.scale_factors": (
+        "scale factors {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "rival.gyro_biases": (
+        "gyro biases {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "rival.misalignments": (
+        "misalignments {factor:.0f} times as large as the specification says fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "delay.gyros_late": (
+        "gyros taken {delay:.3f} s earlier fit the measurements better (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at "
+        "most): they are late against the accelerometers; heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "delay.gyros_early": (
+        "gyros taken {delay:.3f} s later fit the measurements better (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at "
+        "most): they are early against the accelerometers; heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "noise.gyro_stretch": (
+        "the gyros are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
+    ),
+    "noise.accel_stretch": (
+        "the accelerometers are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
+    ),
+    "specification.gyro_noise": (
+        "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "
+        "{said:deg/sqrt(h)|}: it is another sensor's, and so may be what it says of biases"
+    ),
+    "specification.accel_noise": (
+        "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:imu}) says "
+        "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
+    ),
+    "specification.noisier": (
+        "the white noise of the rows (gyros {gyro:deg/sqrt(h)|} deg/sqrt(h), accelerometers {accel:ug/sqrt(Hz)|} ug/sqrt(Hz)) is "
+        "far more than the specification ({imu:imu}) says: a vehicle that vibrates, or another sensor; the answer counts it, and "
+        "such noise hides other errors, as of gyros that are late"
+    ),
+    "specification.suspect": (
+        "the specification ({imu:imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"
+    ),
+    "bias.vertical_steps": (
+        "near {onset:.0f} s the rate about the vertical changes by {size:deg/h|} deg/h and stays so: heading moves by "
+        "{heading:angle}"
+    ),
+    "bias.gravity_drifts": (
+        "gravity moves by {tilt:angle} in the axes of the IMU (likelihood ratio {ratio:.3g}), and the base is still: an "
+        "accelerometer drifts by {moved:ug|.3g} ug, which moves heading by {heading:angle}, or the base tilts as steadily"
+    ),
+    # ---- an indexer's angles, and aids that contradict themselves
+    "encoder.turns": (
+        "the base would turn by {given:deg/s|.2g} deg/s RMS with these angles of the indexer, and by {best:deg/s|.2g} deg/s with "
+        "{reading:term}"
+    ),
+    "encoder.drifts": (
+        "with these angles of the indexer the base turns by {net:deg|.0f} deg from the first third of the log to the last "
+        "({rate:deg/s|.2g} deg/s RMS): no base that stays does"
+    ),
+    "encoder.zero": (
+        "the zero of the inner axis' angle is off by {off:deg|+.3f} ± {sigma:deg|.3f} deg, or the encoder is late or early: the "
+        "base would wobble as the outer axis turns"
+    ),
+    "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
+    "gnss.height_drifts": "the GNSS heights drift by {size:.2g} m against the velocities, {rate:+.2g} m/s (ratio {ratio:.0f})",
+    "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
+    "master.turned": (
+        "the master's velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
+    ),
+    "master.velocity": "the master's velocities are not the changes of its positions, whatever way they are turned",
+}
