@@ -9,6 +9,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.quality.alternation import alternation_evidence
 from truenorth.quality.other_counts import counts_in_turn
 from truenorth.records import ImuRecord
+from truenorth.state.wording import sentence
 
 ROWS, STEP = 15_000, 0.00122  # m/s a row of 10 ms: gravity is 80 of them
 
@@ -43,7 +44,7 @@ def test_every_second_row_of_another_sensor_is_found_and_its_turn_too(angle, car
         log = record(accel)
         assert counts_in_turn(log, 2)
         (found,) = alternation_evidence(log)
-        assert found.key == "record.alternates"
+        assert found.key in ("record.alternates", "record.other_counts")
         # The mean is half of it off; coarse counts know that to some arc seconds.
         assert math.degrees(found.effect.level) == pytest.approx(0.5 * angle, abs=0.02)
 
@@ -62,3 +63,14 @@ def test_nor_is_one_of_half_a_step_in_each_row_or_without_counts():
     accel[:, 0] = STEP * (np.arange(ROWS) % 2 + rng.integers(-1, 2, ROWS) * (rng.random(ROWS) < 0.1))
     assert not counts_in_turn(record(accel), 2)
     assert not counts_in_turn(record(accel + 1e-6 * rng.standard_normal(accel.shape)), 2)
+
+
+def test_rows_that_somebody_has_put_between_are_named_as_well_and_do_next_to_nothing():
+    rng = np.random.default_rng(5)
+    accel = counted(rng, carried=False)
+    own = accel[::2]
+    accel[3:-4:2] = (9.0 * (own[1:-2] + own[2:-1]) - own[:-3] - own[3:]) / 16.0
+    (found,) = alternation_evidence(record(accel))
+    assert found.key == "record.other_counts"
+    assert found.effect.level < math.radians(0.01)
+    assert "put between" in sentence(found)

@@ -42,6 +42,21 @@ def test_nor_one_without_counts():
     assert rolled_over_evidence(replace(record, accel=record.accel + noise)) == []
 
 
+SI = [(120.0, 1e-8), (125.0, 1e-8), (128.0, 1e-8), (320.0, 1e-6), (333.0, 1e-6), (31.25, 1e-5)]
+IN_G = [(125.0, 9.80665e-9), (128.0, 9.80665e-9), (31.25, 9.80665e-6)]
+
+
+@pytest.mark.parametrize(("rate", "step"), SI + IN_G)
+def test_nor_a_text_whose_digits_come_near_a_half_range(rate, step):
+    """Velocity increments of 8 decimals at 120 Hz are 8.17 million steps, of 8.39."""
+    rng = np.random.default_rng(3)
+    force = ([0.05, -0.1, 9.80665] + 3e-3 * rng.standard_normal((4000, 3))) / rate
+    gyro, time = 1e-7 * rng.standard_normal((4000, 3)), np.arange(1.0, 4001.0) / rate
+    assert rolled_over_evidence(ImuRecord(time, gyro, step * np.round(force / step), "increments")) == []
+    other = 1.001 * step  # as near, and no text
+    assert rolled_over_evidence(ImuRecord(time, gyro, other * np.round(force / other), "increments")) != []
+
+
 def test_an_imu_of_which_nothing_is_said_does_not_lie_upside_down_in_silence():
     """Its level was 143 of its sigmas off, `level_only`."""
     inputs, _ = BENCHES["unspecified"].draw(307, 21)

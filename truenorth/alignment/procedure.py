@@ -170,7 +170,7 @@ def align_base(
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)
-    evidence += [] if sound else staying_evidence(written, position.lat)
+    evidence += [] if sound else staying_evidence(written, position.lat, spec)
     if method in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         known: dict[str, Any] = {"calibration": calibration, "heading_limit": heading_limit, "sound": sound}
         own = align_base(as_written, position, imu, at=at, progress=progress, **known)

@@ -228,7 +228,7 @@ def _of_encoder(
     given = readings.pop("given")
     found = encoder_evidence(record, given, readings, gyro_bias)
     found += record_evidence(record, task.motion, given, imu=spec)
-    found += codes_evidence(record, task.position.lat) + hum_evidence(record, task.position.lat)
+    found += codes_evidence(record, task.position.lat) + hum_evidence(record, task.position.lat, spec)
     if len(axes) == 2:
         outer, inner = np.abs(np.diff(np.unwrap(encoder.angles, axis=0)[[0, -1]], axis=0)[0])
         times = outer / inner if inner > 2.0 * math.pi else 1.0  # of what comes back a delay is no zero

@@ -164,11 +164,13 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
         if turned > 0.0:  # few logs come so far
             turned = min(turned, _turned(record, period, STRETCHES[1]))
         if turned == 0.0 and counts_in_turn(record, period):
-            turned = _by_means(record, period)
-        if turned > 0.0:
+            turned, key = _by_means(record, period), "record.other_counts"
+            figures: dict[str, Figure] = {"rows": period, "level": turned}
+        elif turned > 0.0:
             size = turned * GRAVITY_EQUATOR * period / (period - 1.0)
             rows: dict[str, Figure] = {"rows": period} if period > 2 else {}
-            figures: dict[str, Figure] = {"size": size, "level": turned, **rows}
+            figures = {"size": size, "level": turned, **rows}
+        if turned > 0.0:
             found.append(Evidence(key, figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",)))
         if found:  # what is so at half the rate is at others, too
             break
@@ -176,7 +178,7 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
 
 
 def _by_means(record: ImuRecord, period: int) -> float:
-    """The same of rows that are known to be of two sensors: what their means say, with its sigma, chance or not."""
+    """The same of rows that have other counts: what their means say, with its sigma, chance or not."""
     unit = record.interval if record.kind == "increments" else 1.0
     means = [q.mean(axis=1) for q in _of_channels(record, period, STRETCHES[0])]
     square = sum(float(abs(x.mean()) ** 2 + x.var() / len(x)) for x in means)

@@ -10,6 +10,15 @@ pendulum, a raft on a wave. From 5 Hz on that is a centimetre and less, so that 
 do not show is no turn. What cone is left of such lines counts as a bias of the gyros, whose size is known, and the turn itself is
 one that the attitude at a row does not have.
 
+Accelerometers that are slower than the gyros show less of a turn. Of its squares they show ``|H_a/H_g|^2`` of both low passes, as
+the specification gives their bandwidths and orders, and no more than all. Where it gives none, equal bandwidths are assumed. What
+lacks its tilt by that is a hum for sure
+
+- where the accelerometers' bandwidth is given and lets most of it pass;
+- where less is shown than the slowest accelerometers would show, of two poles at 5 Hz.
+
+Else it may be a bandwidth of the accelerometers instead, and is a hint.
+
 Both densities are of the same windows, summed over the log. Noise of accelerometers passes for a tilt: what it hides is not
 said.
 
@@ -28,8 +37,9 @@ from numpy.typing import NDArray
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.records.vibration import share_left, share_of_increments
-from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -42,6 +52,7 @@ FEWEST = 64  # rows of a window
 LINE = 3  # frequencies of a tone, by the taper of a window
 STAYS = 0.3  # rad, between the halves of a window
 SLOWEST = 2.0 * math.pi * 5.0  # rad/s, from which on an arm of a centimetre cannot hide the tilt
+POLES = 2  # of the slowest low pass of accelerometers, as far down: the least setting of micromechanical ones
 LEAST = 2e-10  # rad/s, 4e-5 deg/h: no gyro has as small a bias
 
 
@@ -51,18 +62,35 @@ class Hum(NamedTuple):
     drift: Array  # (3,) rad/s about body axes, of a cone that no motion makes
     turn: float  # rad, RMS about the worst axis
 
+    def evidence(self, kind: Kind, lat: float | None = None) -> list[Evidence]:
+        """What it does to a base that stays at a latitude (rad), or that moves; nothing where it is less than any gyro's bias."""
+        size = float(np.linalg.norm(self.drift))
+        if max(size, self.turn * EARTH_RATE) < LEAST:
+            return []
+        north = 0.0 if lat is None else size / max(EARTH_RATE * math.cos(lat), 1e-12)
+        effect = Effect(math.hypot(north, self.turn), self.turn)
+        figures: dict[str, Figure] = {"drift": size, "heading": effect.heading, "level": self.turn}
+        key, remedy = ("record.hum", "source") if kind == "known" else ("record.hum_or_slow", "bandwidths")
+        return [Evidence(key, figures, kind, effect, (remedy,))]
+
+
+NONE = Hum(np.zeros(3), 0.0)
+
 
 @remembered
-def hum_of(record: ImuRecord) -> Hum:
-    """What gyros show of turns from 5 Hz on whose tilt the accelerometers do not show."""
+def hum_of(record: ImuRecord, imu: ImuSpec | None = None) -> tuple[Hum, Hum]:
+    """What gyros show of turns from 5 Hz on whose tilt the accelerometers do not show: for sure, and what slow ones may hide.
+
+    Equal bandwidths of gyros and accelerometers are assumed where the specification gives none.
+    """
     length = _window(record)
     blocks = len(record) // length
-    w = 2.0 * math.pi * np.arange(length // 2 + 1) / (length * record.interval)
+    w = np.asarray(2.0 * math.pi / (length * record.interval) * np.arange(length // 2 + 1), dtype=np.float64)
     fast = w >= SLOWEST
     x = np.asarray(w[fast] * record.interval)
     made = share_of_increments(x) if record.kind == "increments" else 1.0 + share_left(x)
     if not blocks or np.count_nonzero(fast) < LINE:
-        return Hum(np.zeros(3), 0.0)
+        return NONE, NONE
     unit = 1.0 / record.interval if record.kind == "increments" else 1.0
     window = np.hanning(length)
     scale = unit * 2.0 * math.sqrt(8.0 / 3.0) / length  # to amplitudes: a window of power 3/8
@@ -81,10 +109,29 @@ def hum_of(record: ImuRecord) -> Hum:
         turned += np.abs(turn) ** 2
         tilt += np.sum(np.abs(GRAVITY_EQUATOR * np.cross(up, turn)) ** 2, axis=1)
         shown += np.sum(np.abs(np.cross(up, force)) ** 2, axis=1)
-    line = np.ones(LINE)
-    alone = np.convolve(shown, line, "same") < limit("tilt of a turn") * np.convolve(tilt, line, "same")
-    largest = float(turned[alone].sum(axis=0).max())
-    return Hum(made[alone] @ cone[alone] / blocks, math.sqrt(0.5 * largest / blocks))
+    line, least = np.ones(LINE), limit("tilt of a turn")
+    tilt, shown = np.convolve(tilt, line, "same"), np.convolve(shown, line, "same")
+    share = np.ones_like(w) if imu is None else np.minimum(_passed(imu, "accel", w) / _passed(imu, "gyro", w), 1.0)
+    alone = shown < least * share * tilt
+    said = imu is not None and math.isfinite(imu.accel_bandwidth)
+    sure = alone & ((said & (share > least)) | (shown < least * low_pass(w, SLOWEST, POLES) * tilt))
+
+    def of(lines: NDArray[np.bool_]) -> Hum:
+        largest = float(turned[lines].sum(axis=0).max())
+        return Hum(made[lines] @ cone[lines] / blocks, math.sqrt(0.5 * largest / blocks))
+
+    return of(sure), of(alone & ~sure)
+
+
+def _passed(imu: ImuSpec, sensor: str, w: Array) -> Array:
+    """Share of the squares that the sensors' low pass leaves at frequencies (rad/s), as it is specified."""
+    bandwidth, order = (getattr(imu, f"{sensor}_{key}") for key in ("bandwidth", "filter_order"))
+    return low_pass(w, 2.0 * math.pi * bandwidth, order)
+
+
+def low_pass(w: Array, corner: float, poles: int) -> Array:
+    """Share of the squares at frequencies (rad/s) that a low pass of one pole leaves, or Butterworth's of two."""
+    return np.asarray(1.0 / (1.0 + (w / corner) ** (2 * poles)))
 
 
 def _window(record: ImuRecord) -> int:
@@ -100,23 +147,13 @@ def _window(record: ImuRecord) -> int:
     return length
 
 
-def hum_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
+def hum_evidence(record: ImuRecord, lat: float, imu: ImuSpec | None = None) -> list[Evidence]:
     """What a hum of the gyros does to a base that stays at a latitude (rad)."""
-    drift, turn = hum_of(record)
-    return _evidence(
-        drift, math.hypot(float(np.linalg.norm(drift)) / max(EARTH_RATE * math.cos(lat), 1e-12), turn), turn
-    )
+    sure, perhaps = hum_of(record, imu)
+    return sure.evidence("known", lat) + perhaps.evidence("hint", lat)
 
 
 def moving_hum_evidence(record: ImuRecord) -> list[Evidence]:
     """What it does to the attitude at a row of a base that moves; its drift is a bias, which aids show."""
-    drift, turn = hum_of(record)
-    return _evidence(drift, turn, turn)
-
-
-def _evidence(drift: Array, heading: float, turn: float) -> list[Evidence]:
-    size = float(np.linalg.norm(drift))
-    if max(size, turn * EARTH_RATE) < LEAST:
-        return []
-    figures: dict[str, Figure] = {"drift": size, "heading": heading, "level": turn}
-    return [Evidence("record.hum", figures, "known", Effect(heading, turn), ("source",))]
+    sure, perhaps = hum_of(record)
+    return sure.evidence("known") + perhaps.evidence("hint")

@@ -68,10 +68,13 @@ def record_evidence(
     return found if tilt is None else found + tilt.evidence()
 
 
-def staying_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
-    """Evidence of the values of a base that stays at a latitude (rad), by what they do to means."""
-    checks = (quantum_evidence, codes_evidence, spikes_evidence, hum_evidence)
-    return [item for check in checks for item in check(record, lat)]
+def staying_evidence(record: ImuRecord, lat: float, imu: ImuSpec | None = None) -> list[Evidence]:
+    """Evidence of the values of a base that stays at a latitude (rad), by what they do to means.
+
+    `imu`: whose bandwidths say what the accelerometers show of a turn.
+    """
+    checks = (quantum_evidence, codes_evidence, spikes_evidence)
+    return [item for check in checks for item in check(record, lat)] + hum_evidence(record, lat, imu)
 
 
 def moving_evidence(record: ImuRecord) -> list[Evidence]:

@@ -4,12 +4,14 @@ A counter of b bits holds ``-2^(b-1) .. 2^(b-1) - 1``. What is beyond goes on at
 than the half range, is written as ``N - 2^b``. An IMU at rest of which nothing is said then lies upside down with another bias of
 its accelerometers, and no other row says so. But the counts do: |N - 2^b| is the half range, less what N was beyond it. An
 accelerometer of that range could hold gravity and its bias only just, and is hardly made. Where another row of the sensor is beyond
-the half range the counter is no such one.
+the half range the counter is no such one. Nor is a log of a text: its steps are powers of ten, in SI or in g.
 
 Source: the arithmetic of two's complement; by how much the force may miss gravity is a limit of the unit's check.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,11 @@ from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
-BITS = (16, 24)  # finer counts than the noise do not show
+# The common words: a sound counter of any length may have gravity that near to a half range, each by a chance of one in six, and
+# each further length is another such warning of a sound log.
+BITS = (16, 24)
+TEXT = 1e-6  # of a step, by which it may miss a power of ten: digits of a text, no counter
+STANDARD_GRAVITY = 9.80665  # m/s^2
 WHOLE = 1e-3  # of a count, by which values may miss multiples of the step
 
 
@@ -37,6 +43,12 @@ def counts_of(sensor: Array) -> Array | None:
     return whole if float(np.max(np.abs(counts - whole) / np.maximum(np.abs(whole) * 1e-6, 1.0))) < WHOLE else None
 
 
+def _is_text(step: float) -> bool:
+    """Whether a step is a digit of a text: a power of ten, in SI or in g."""
+    digits = (math.log10(step / unit) for unit in (1.0, STANDARD_GRAVITY))
+    return any(abs(x - round(x)) < TEXT * math.log10(math.e) for x in digits)
+
+
 def rolled_over_evidence(record: ImuRecord) -> list[Evidence]:
     """That gravity stands at the end of a counter of the accelerometers."""
     unit = 1.0 / record.interval if record.kind == "increments" else 1.0
@@ -45,7 +57,7 @@ def rolled_over_evidence(record: ImuRecord) -> list[Evidence]:
     if abs(unit * float(force[channel])) < (1.0 - limit("gravity")) * GRAVITY_EQUATOR:
         return []
     counts = counts_of(record.accel)
-    if counts is None:
+    if counts is None or _is_text(float(np.max(np.abs(record.accel)) / np.max(np.abs(counts)))):
         return []
     largest, middle = float(np.abs(counts).max()), abs(float(np.median(counts[:, channel])))
     for half in (2.0 ** (bits - 1) for bits in BITS):

@@ -4,16 +4,13 @@ A row of a smooth motion is what its six neighbours say, ``(15 (x_1 + x_-1) - 6 
 difference. A row that misses that by far more than others of its time, and behind which the values are what they were before it,
 is a spike. Spikes to one side add ``H = sum s`` to the sum of all rows, and ``H / N`` to their mean. Three things look alike:
 
-- a knock. The base comes back to rest: of its force nothing is left a second later, nor of its turn. The sum of all that the
-  rows around its spikes are beyond their usual value is then nothing, and not H;
+- a knock. The base comes back to rest: what follows its spikes is their opposite, on the mean (:mod:`truenorth.quality.knocks`);
 - the pulse of a coarse counter, which is true. It carries its remainders on: with its pulses, sums over many rows scatter by
   less than without them. Independent errors make them scatter by more;
 - a step of a counter: as large as what rounding makes of any row.
 
-Of a knock a mended log lacks H in the rows around: their sums, held against the six sums next to them as a row is against its
-neighbours, are off by -H, of errors by what they are off at other places of the log.
-
-What is none of these is an error of a row, and H is one of the mean. Rows that stand out by less, of which noise has some, are
+What is none of these is an error of a row, and H is one of the mean; where the log does not show whether it is a knock, H / N is in
+sigma. Rows that stand out by less, of which noise has some, are
 errors where their signs are not those of noise: ``H^2`` is then far more than ``sum s^2``.
 
 Source: the Hampel identifier (R. Pearson, *Mining Imperfect Data*, SIAM 2005, ch. 2) on sixth differences. The rest is ours.
@@ -28,9 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
+from truenorth.quality.knocks import sums_of_answer
 from truenorth.quality.quantum import lattice
 from truenorth.records import COLUMNS, ImuRecord
-from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -43,13 +41,19 @@ MEDIAN = 0.6745  # of the size of Gaussian values, in sigmas
 FAR = 8.0  # sigmas: Gaussian noise has one in 10^15
 SAME = 0.5  # of the spike, by which the values before and behind it may differ, but for a slope: a step is all of it
 MOST = 0.1  # of the rows: more are no single ones
-AFTER = (1.0, 0.3, 0.1)  # s, in which a base that was knocked comes back to rest: on springs, on tyres, a hull
-PLACES = 64  # of a log, at which the same windows are looked at
 NEAR = 4.0  # sigmas, from which on rows are asked for their signs: one in 16,000 by chance
 FEWEST = 3  # spikes
 SUMS = (8, 32, 128, 512)  # rows, of which sums show whether remainders are carried on
 BLOCKS = 8  # such sums at least
 CARRIED = 0.6  # of their scatter without spikes, that pulses of a counter leave at the most
+
+
+class OneSided(NamedTuple):
+    """Spikes of a channel to one side."""
+
+    kind: Kind  # known: they are errors; hint: they may be
+    rows: int
+    mean: float  # by which they move the mean of the channel
 
 
 class Spikes(NamedTuple):
@@ -105,24 +109,39 @@ def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
     record : ImuRecord
     lat : float, rad
     """
-    unit = 1.0 / record.interval if record.kind == "increments" else 1.0
+    counted = record.kind == "increments"
+    unit = 1.0 / record.interval if counted else 1.0
+    share = np.where(_bridged(record), record.interval / record.steps, 1.0) if counted else np.ones(len(record))
     found = []
     for channel, name in enumerate(COLUMNS[record.kind]):
         sensor = record.gyro if channel < 3 else record.accel
-        count, mean = one_sided(sensor[:, channel % 3], record.interval)
-        if mean == 0.0:
+        spikes = one_sided(sensor[:, channel % 3] * share, record.interval)
+        if spikes is None:
             continue
-        size = abs(mean) * unit
+        size = abs(spikes.mean) * unit
         effect = Effect(level=size / GRAVITY_EQUATOR)
         if channel < 3:
             effect = Effect(heading=size / max(EARTH_RATE * math.cos(lat), 1e-12))
-        figures: dict[str, Figure] = {"name": name, "count": count, "heading": effect.heading, "level": effect.level}
-        found.append(Evidence("record.spikes", figures, "known", effect, ("source",)))
+        figures: dict[str, Figure] = {
+            "name": name,
+            "count": spikes.rows,
+            "heading": effect.heading,
+            "level": effect.level,
+        }
+        key = "record.spikes" if spikes.kind == "known" else "record.spikes_or_knocks"
+        found.append(Evidence(key, figures, spikes.kind, effect, ("source",)))
     return found
 
 
-def one_sided(values: Array, interval: float) -> tuple[int, float]:
-    """Spikes of a channel (N,) that are errors to one side, and the error of its mean; zeros where chance or a base makes them."""
+def _bridged(record: ImuRecord) -> NDArray[np.bool_]:
+    """(N,) rows that are as long as those that were lost before them: their increments are no spikes."""
+    bridged = np.zeros(len(record), dtype=np.bool_)
+    bridged[record.gaps] = True
+    return bridged
+
+
+def one_sided(values: Array, interval: float) -> OneSided | None:
+    """Spikes of a channel (N,) to one side that are errors, or may be; None where chance, a base or a counter makes them."""
     step, _ = lattice(values)
     for far in (NEAR, FAR):
         at, said = spikes_of(values, interval, far)
@@ -132,49 +151,31 @@ def one_sided(values: Array, interval: float) -> tuple[int, float]:
         total = float(size.sum())
         by_chance = math.sqrt(float(np.sum(size**2))) if far < FAR else 0.0
         if len(at) >= FEWEST and abs(total) > limit("one-sided spikes") * by_chance:
-            return (len(at), total / len(values)) if _are_errors(values, at, said, interval) else (0, 0.0)
-    return 0, 0.0
+            kind = _kind(values, at, said, interval)
+            return None if kind is None else OneSided(kind, len(at), total / len(values))
+    return None
 
 
-def _are_errors(values: Array, at: Rows, said: Array, interval: float) -> bool:
-    """Whether rows at which a channel is not as its neighbours say are neither knocks nor pulses of a counter.
+def _kind(values: Array, at: Rows, said: Array, interval: float) -> Kind | None:
+    """What rows are at which a channel is not as its neighbours say: None where they are knocks, or pulses of a counter.
 
-    By the longest time after a knock in which the motion of the base leaves their sum to be seen.
+    Known where they are errors, a hint where the log does not show which of both they are, and they are more than noise is.
     """
     mended = values.copy()
     mended[at] = said
-    for time in AFTER:
-        total, left, scatter = _balance(values, mended, at, max(round(time / interval), 1))
-        enough = limit("one-sided spikes") * scatter
-        if abs(total) > enough:
-            return abs(left) < min(enough, 0.5 * abs(total)) and not _are_pulses(values, mended)
-    return False
+    answers, enough = sums_of_answer(mended, values - mended, interval), limit("one-sided spikes")
+    if all(answer.is_knock(enough) for answer in answers) or _are_pulses(values, mended):
+        return None
+    if all(answer.is_error(enough) for answer in answers):
+        return "known"
+    return "hint" if abs(float(np.sum(values - mended))) > _of_noise(values) else None
 
 
-def _balance(values: Array, mended: Array, at: Rows, side: int) -> tuple[float, float, float]:
-    """Sum of spikes in windows of so many rows to either side of each, what the rest of these is off, and one sigma of that.
-
-    The rest of a window is held against the six next to it, and sigma is what it is off at other places of the log.
-    """
-    width = 2 * side + 1
-    windows, spikes = (_sums(x, width) for x in (mended - mended.mean(), values - mended))
-    if len(windows) < (2 * HALF + 1) * width + PLACES:
-        return 0.0, 0.0, math.inf
-    reach = HALF * width
-    off = windows[reach:-reach].copy()
-    for k, weight in enumerate(NEIGHBOURS):
-        off -= weight * windows[k * width : k * width + len(off)]
-    first = at - side  # row of each window, and then where it stands among those that have neighbours
-    first = first[(first >= reach) & (first < reach + len(off))] - reach
-    places = np.arange(1, PLACES) * len(off) // PLACES
-    elsewhere = np.array([off[(first + place) % len(off)].sum() for place in places])
-    return float(spikes[first + reach].sum()), float(off[first].sum()), math.sqrt(float(np.mean(elsewhere**2)))
-
-
-def _sums(x: Array, width: int) -> Array:
-    """(N - width + 1,) sums of so many neighbours."""
-    total = np.concatenate([[0.0], np.cumsum(x)])
-    return np.asarray(total[width:] - total[:-width])
+def _of_noise(values: Array) -> float:
+    """One sigma of what white noise adds to the sum of all rows."""
+    off = values[HALF:-HALF] - np.convolve(values, NEIGHBOURS, mode="valid")
+    white = float(np.median(np.abs(off))) / MEDIAN / math.sqrt(1.0 + float(NEIGHBOURS @ NEIGHBOURS))
+    return white * math.sqrt(len(values))
 
 
 def _are_pulses(values: Array, mended: Array) -> bool:

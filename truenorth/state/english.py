@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from truenorth.state.english_rows import RECORD
 from truenorth.state.english_sensors import OF_SENSORS
 
 SENTENCES = {
+    **RECORD,
     "text": "{text}",
     # ---- what an alignment reached
     "heading.known": (

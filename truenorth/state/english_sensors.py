@@ -4,52 +4,10 @@ from __future__ import annotations
 
 OF_SENSORS = {
     # ---- the record itself
-    "record.saturated": "{text}",
-    "record.constant_channel": "{text}",
-    "record.rows_again": "{text}",
-    "record.gyro_unit": "{text}",
-    "record.accel_unit": "{text}",
-    "record.accel_level": "{text}",
-    "record.no_gravity": "{text}",
-    "record.repeated_rows": "{text}",
-    "record.no_noise": "{text}",
-    "record.frozen": "{text}",
-    "record.gaps": "{text}",
-    "record.jitter": "{text}",
-    "record.vibration": (
-        "vibration that rows at {rate:.4g} Hz hardly sample turns the attitude at the last one by {size:angle} (one sigma), and "
-        "its coning is a gyro bias of {drift:deg/h|.2g} deg/h: log increments, or more rows a second"
-    ),
-    "record.time_unit": "{text}",
-    "record.reordered_rows": "{text}",
-    "record.clock_jumps": (
-        "the log has {count:d} gap(s) of {lost:.2f} s in all, and fits the measurements better without them (likelihood ratio "
-        "{ratio:.0f}): its clock has jumped, no rows are lost"
-    ),
-    "record.coarse": (
-        "{name} is written in steps of {step:.3g}, which hide its noise: its mean may be off by a part of a step; heading by "
-        "{heading:angle}, level by {level:angle}"
-    ),
-    "record.codes": "{name} is {value:.4g} in {rows} rows and no other from {from:.4g} to {to:.4g}: missing codes, or a dead band",
-    "record.spikes": (
-        "{count} single rows of {name} stand out to one side, and the rows around them show no motion: errors of the log, not "
-        "knocks; heading by {heading:angle}, level by {level:angle}"
-    ),
-    "record.hum": (
-        "gyros hum as on a cone, and the accelerometers show no tilt of it: no motion, but a drift of {drift:deg/h|} deg/h; "
-        "heading by {heading:angle}, level by {level:angle}"
-    ),
     "record.line": (
         "accelerometers show a line from 5 Hz on, and the gyros no turn that explains it: a vibration, or a hum that is no motion; "
         "velocity at a row may be off by {size:.2g} m/s (RMS)"
     ),
-    "record.alternates": (
-        "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
-        "their mean is turned against either by {level:angle}"
-    ),
-    "record.in_turn": "one in {rows} rows of accelerometers differs by {size:.3g} m/s^2: sensors in turn, {level:angle} apart",
-    "record.rolls_over": "{name} stands at {count:.0f} of {range:.0f} counts: gravity may have rolled over at a range's end",
-    "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     # ---- its sensors, against each other, the measurements and the specification
     "tilt.axes": (
         "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "

@@ -19,6 +19,7 @@ REMEDIES = {
     "common_clock": "check that both come from one clock and one filter",
     "grid_north": "check whether they count from grid north",
     "encoder": "check the order, signs, zero and clock of the indexer's angles",
+    "bandwidths": "give the bandwidths of gyros and accelerometers in the specification",
     "sensor_axes": "check its axes and unit",
     "imu_axes": "check the IMU's axes",
     "mounting": "give the mounting",
