@@ -177,7 +177,7 @@ class Master(_Mounted):
     record : MasterRecord
     mounting : Mounting, optional
         Lever arm from the IMU to the master, ``C_mb`` from the IMU's to the master's axes, and what they are uncertain by. Left
-        out: arm and angles zero to 5 m and 3 deg, latency zero to 50 ms.
+        out: angles zero to 3 deg, latency to 50 ms, the arm to 1 m, or to 5 m where the log shows one of 5 m and more.
     matching : {"auto", "velocity", "attitude", "both", "position", "acceleration", "position+attitude", "acceleration+attitude"}
     flexure : FlexureSpec, optional
         The IMU's seat bends.

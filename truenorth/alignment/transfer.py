@@ -106,7 +106,8 @@ def align_transfer(
     lever_arm : three floats, optional, m
         From the master to the slave, slave axes (right, forward, up); zero when left out.
     lever_arm_sigma : float, optional, m
-        0: known, and not estimated. Left out, 1 m of an arm that is given, 5 m of one of which nothing is said.
+        0: known, and not estimated. Left out, 1 m of an arm that is given, 5 m of one of which nothing is said: of more than 1 m
+        only where the log shows it.
     delay, delay_sigma : float, s
         By which the master's stamps are late, and what that is uncertain by; 0: known.
     mounting : three floats, rad
@@ -157,9 +158,40 @@ def align_transfer(
     said = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     said, notes = common_clock(slave, master, said)
     errors = _errors(master, master_errors)
-    model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
-    noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
+    noise = first_noise(what, {**given, "attitude": attitude_noise})
+
+    def by(said: Assumed) -> Alignment:
+        return _aligned(
+            slave, master, spec, said, what, flexure, errors, noise, position, (where, *notes), heading_limit, tell
+        )
+
+    if said.lever_arm_sigma <= LEVER_ARM_SIGMA:
+        answer = by(said)
+    else:  # most arms are a metre or two: a wide one has the noise of a poor slave part it from a delay
+        answer = by(replace(said, lever_arm_sigma=LEVER_ARM_SIGMA))
+        if any(item.key == "transfer.lever_arm" for item in answer.evidence):
+            answer = by(said)
+    return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
+
+
+def _aligned(
+    slave: ImuRecord,
+    master: MasterRecord,
+    spec: ImuSpec,
+    said: Assumed,
+    what: Matched,
+    flexure: FlexureSpec | None,
+    errors: MasterErrors,
+    first: tuple[tuple[float, float], list[bool]],
+    position: Position | None,
+    notes: Sequence[str],
+    heading_limit: float,
+    tell: Callable[[str], None],
+) -> Alignment:
+    """The alignment with what is said of clocks, arm and seat; the first of `notes` is where the specification comes from."""
+    model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
+    noise, fitted = first
     handed = partial(hand_over, slave, master, model, spec, said, position=position)
     found = found_in_passes(slave, master, model, handed, said, noise, fitted, what.kind, tell)
     noise = found.noise
@@ -176,8 +208,8 @@ def align_transfer(
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
     last = LastPass(part, master, model, said, start, what, noise, track, carried, least, found.left)
-    answer = assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
-    return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
+    where, *others = notes
+    return assemble_transfer(last, spec, where, (*others, *master.notes), heading_limit, seen)
 
 
 def _check_length(part: ImuRecord, source: str) -> None:
