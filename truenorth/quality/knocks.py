@@ -28,7 +28,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import matmul_toeplitz
 
 Array = NDArray[np.float64]
 
@@ -70,6 +69,8 @@ def sums_of_answer(mended: Array, spikes: Array, interval: float) -> list[Sum]:
         What was taken off; zero in all other rows.
     interval : float, s
     """
+    from scipy.linalg import matmul_toeplitz
+
     rows = len(mended)
     reach = min(max(round(LASTS / interval), BEFORE + 1), rows // 4)
     hats, lags = _hats(reach, max(round(APART / interval), 1))
