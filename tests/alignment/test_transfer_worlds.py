@@ -109,7 +109,7 @@ def test_only_what_comes_back_is_noise():
     assert 3.0 < _colour(t, bend) < 7.0
 
 
-@pytest.mark.parametrize("said", some([{}], [{"lever_arm": (6.0, -8.0, 3.0)}]))
+@pytest.mark.parametrize("said", some([{}, {"lever_arm_sigma": 10.0}], [{"lever_arm": (6.0, -8.0, 3.0)}]))
 def test_of_an_arm_nothing_is_said_or_it_is_measured(said):
     """A ship's master ten metres away: refused, since an arm of which nothing was said was taken for known to a metre."""
     way, arm = ship(), (6.2, -8.5, 3.4)
@@ -117,6 +117,8 @@ def test_of_an_arm_nothing_is_said_or_it_is_measured(said):
     own = replace(MASTER, lever_arm=arm)
     answer = align_transfer(slave, simulate_sensor(way, own, duration=120.0, seed=11).record, TACTICAL, **said)
     assert answer.status == "aligned", answer.reasons
+    expected = said.get("lever_arm_sigma", 1.0 if said else 5.0)  # what is said holds; nothing said: as the log shows
+    assert answer.transfer.lever_arm_prior[0] == expected
     assert np.abs((answer.transfer.lever_arm - arm) / answer.transfer.lever_arm_sigma).max() < 4.0
 
 

@@ -117,7 +117,7 @@ def _seen(record: ImuRecord, imu: ImuSpec, sigma: Array) -> Mask:
     length = round(PIECE / interval)
     pieces = len(turns) // length
     if pieces == 0:
-        return ONE.ravel() < 1
+        return ~ONE.ravel()
     angle = np.cumsum(turns[: pieces * length].reshape(pieces, length, 3), axis=1)
     angle -= angle.mean(axis=1, keepdims=True)
     time = np.arange(length) - 0.5 * (length - 1)

@@ -163,15 +163,14 @@ def align_transfer(
 
     def by(said: Assumed) -> Alignment:
         return _aligned(
-            slave, master, spec, said, what, flexure, errors, noise, position, (where, *notes), heading_limit, tell
+            slave, master, spec, where, said, notes, what, flexure, errors, noise, position, heading_limit, tell
         )
 
-    if said.lever_arm_sigma <= LEVER_ARM_SIGMA:
+    # Most arms of which nothing is said are a metre or two. Of a wide one the noise of a poor slave would part it from a delay.
+    unsaid = said.lever_arm_sigma == VEHICLE_ARM
+    answer = by(replace(said, lever_arm_sigma=LEVER_ARM_SIGMA) if unsaid else said)
+    if unsaid and any(item.key == "transfer.lever_arm" for item in answer.evidence):
         answer = by(said)
-    else:  # most arms are a metre or two: a wide one has the noise of a poor slave part it from a delay
-        answer = by(replace(said, lever_arm_sigma=LEVER_ARM_SIGMA))
-        if any(item.key == "transfer.lever_arm" for item in answer.evidence):
-            answer = by(said)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
 
 
@@ -179,17 +178,18 @@ def _aligned(
     slave: ImuRecord,
     master: MasterRecord,
     spec: ImuSpec,
+    where: str,
     said: Assumed,
+    notes: Sequence[str],
     what: Matched,
     flexure: FlexureSpec | None,
     errors: MasterErrors,
     first: tuple[tuple[float, float], list[bool]],
     position: Position | None,
-    notes: Sequence[str],
     heading_limit: float,
     tell: Callable[[str], None],
 ) -> Alignment:
-    """The alignment with what is said of clocks, arm and seat; the first of `notes` is where the specification comes from."""
+    """The alignment with what is said of clocks, arm and seat, by a specification and where that comes from."""
     model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     noise, fitted = first
     handed = partial(hand_over, slave, master, model, spec, said, position=position)
@@ -208,8 +208,7 @@ def _aligned(
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
     last = LastPass(part, master, model, said, start, what, noise, track, carried, least, found.left)
-    where, *others = notes
-    return assemble_transfer(last, spec, where, (*others, *master.notes), heading_limit, seen)
+    return assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
 
 
 def _check_length(part: ImuRecord, source: str) -> None:

@@ -25,9 +25,8 @@ def _hum(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     k = over_decades(rng, 3.0, 3000.0)
     size, phase = k * usual * rng.uniform(0.3, 1.0, 3), rng.uniform(0.0, 2.0 * math.pi, 3)
     tone = np.sin(2.0 * math.pi * share * np.arange(len(record))[:, None] + phase)
-    return replace(
-        record, **{sensor: values + size * tone}
-    ), f"{sensor} {k:.3g} times the noise at {share:.3f} of the rate"
+    size_said = f"{sensor} {k:.3g} times the noise at {share:.3f} of the rate"
+    return replace(record, **{sensor: values + size * tone}), size_said
 
 
 def _g_sensitive(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
@@ -55,9 +54,8 @@ def _clipped_between(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     x = sign * values[:, axis]
     end = float(np.median(x)) + share * float(np.max(x) - np.median(x))
     values[:, axis] = sign * np.minimum(step * np.round(x / step), end)
-    return replace(
-        record, accel=values
-    ), f"{'xyz'[axis]} at {share:.2f} of its largest, counts of {k:.2f} times the noise"
+    size_said = f"{'xyz'[axis]} at {share:.2f} of its largest, counts of {k:.2f} times the noise"
+    return replace(record, accel=values), size_said
 
 
 SIGNAL_FAULTS: tuple[Fault, ...] = (

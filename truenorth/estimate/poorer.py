@@ -44,13 +44,15 @@ ALONE = {"rival.scale_factors": ("scale_factor", "scale_factor_asymmetry"), "riv
 KINDS = {"rival.poorer": FIELDS, **ALONE}
 # Where the earth's rate tells heading, a gyro's bias turns it: gyros that feel force, or are warmer than when they were calibrated,
 # have larger ones, and are no noisier.
+SENSORS = ("gyro_", "accel_")
 BIASES: dict[str, tuple[str, ...]] = {"rival.gyro_biases": ("gyro_bias", "gyro_turn_on_bias")}
 
 
 def poorer(spec: ImuSpec, factor: float, fields: Sequence[str] = FIELDS) -> ImuSpec:
     """A specification all of whose errors, or those of these kinds, of one sensor or of both, are so many times as large."""
-    both = [f"{sensor}_{field}" for sensor in ("gyro", "accel") for field in fields]
-    names = [name for name in (*fields, *both) if hasattr(spec, name)]
+    of_one = [name for name in fields if name.startswith(SENSORS)]
+    of_both = [sensor + field for sensor in SENSORS for field in fields if field not in of_one]
+    names = [*of_one, *of_both]
     return replace(spec, **{name: factor * getattr(spec, name) for name in names})
 
 

@@ -10,8 +10,8 @@ is a spike. Spikes to one side add ``H = sum s`` to the sum of all rows, and ``H
 - a step of a counter: as large as what rounding makes of any row.
 
 What is none of these is an error of a row, and H is one of the mean; where the log does not show whether it is a knock, H / N is in
-sigma. Rows that stand out by less, of which noise has some, are
-errors where their signs are not those of noise: ``H^2`` is then far more than ``sum s^2``.
+sigma. Rows that stand out by less, of which noise has some, are errors where their signs are not those of noise: ``H^2`` is then
+far more than ``sum s^2``.
 
 Source: the Hampel identifier (R. Pearson, *Mining Imperfect Data*, SIAM 2005, ch. 2) on sixth differences. The rest is ours.
 """
@@ -88,9 +88,8 @@ def spikes_of(values: Array, interval: float, far: float = FAR) -> Spikes:
     near, far_off = (
         0.5 * sum(values[at + lag] - values[at - lag] for lag in lags) for lags in ((1, 2), (HALF, HALF + 1))
     )
-    step = (
-        7.0 * near - 3.0 * far_off
-    ) / 4.0  # of means 3 and 7 rows from each other, in which a slope has 3 and 7 times
+    # Of means 3 and 7 rows from each other, in which a slope has 3 and 7 times.
+    step = (7.0 * near - 3.0 * far_off) / 4.0
     at = at[np.abs(step) < SAME * size[at - HALF]]
     return none if len(at) > MOST * len(values) else Spikes(at, said[at - HALF])
 
@@ -111,7 +110,9 @@ def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
     """
     counted = record.kind == "increments"
     unit = 1.0 / record.interval if counted else 1.0
-    share = np.where(_bridged(record), record.interval / record.steps, 1.0) if counted else np.ones(len(record))
+    share = np.ones(len(record))
+    if counted:  # a row that is as long as those that were lost before it is no spike
+        share[record.gaps] = record.interval / record.steps[record.gaps]
     found = []
     for channel, name in enumerate(COLUMNS[record.kind]):
         sensor = record.gyro if channel < 3 else record.accel
@@ -131,13 +132,6 @@ def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
         key = "record.spikes" if spikes.kind == "known" else "record.spikes_or_knocks"
         found.append(Evidence(key, figures, spikes.kind, effect, ("source",)))
     return found
-
-
-def _bridged(record: ImuRecord) -> NDArray[np.bool_]:
-    """(N,) rows that are as long as those that were lost before them: their increments are no spikes."""
-    bridged = np.zeros(len(record), dtype=np.bool_)
-    bridged[record.gaps] = True
-    return bridged
 
 
 def one_sided(values: Array, interval: float) -> OneSided | None:
