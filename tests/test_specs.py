@@ -46,8 +46,9 @@ def test_a_file_in_datasheet_units(tmp_path):
     }
     perfect = ImuSpec()
     for item in fields(spec):
-        if item.name not in {*expected, "name"}:
+        if item.name not in {*expected, "name", "unsaid"}:
             assert getattr(spec, item.name) == getattr(perfect, item.name)
+    assert spec.unsaid == ("accel_bias_instability", "accel_scale_factor", "accel_misalignment")
     for name, value in expected.items():
         assert getattr(spec, name) == pytest.approx(value, rel=1e-14), name
 
@@ -151,8 +152,10 @@ def test_every_key_is_written_and_read_back(tmp_path):
         "correlation_time": "10 s",
     }
     spec = imu_spec(content)
+    assert spec.unsaid == ()
     for item in fields(spec):
-        assert getattr(spec, item.name) != getattr(ImuSpec(), item.name) or item.name == "accel_filter_order"
+        alike = item.name in ("accel_filter_order", "unsaid")
+        assert getattr(spec, item.name) != getattr(ImuSpec(), item.name) or alike
     assert spec.accel_positions == ((0.03, 0, 0), (0, 0.03, 0), (0, 0, -0.03))
     assert spec.gyro_rate_random_walk == pytest.approx(3 * DEG / 3600 / 60, rel=1e-14)
     assert spec.accel_rate_random_walk == pytest.approx(3e-6 * G / 60, rel=1e-14)

@@ -20,6 +20,7 @@ from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specified import epoch_felt
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import Evidence
 
 
 @dataclass(frozen=True)
@@ -284,7 +285,8 @@ def align(
         Of numbers: degrees and metres. Not needed where GNSS or the master has positions.
     imu : ImuSpec, str, path or mapping, optional
         Specification, a preset's name, or a YAML file. On a base that stays the scale of the errors is inferred from the log when
-        it is left out.
+        it is left out, or names no bias of the gyros; other errors that it does not name are taken as usual
+        (:mod:`truenorth.alignment.unsaid`).
     aid : aid or sequence of aids
         :class:`Odometer`, :class:`VelocityLog`, :class:`Gnss`, :class:`Master`, :class:`Indexer`, :class:`Positions`; on the
         move also :class:`Attitude`, :class:`Magnetometer`, or one of your own, as navigation takes it.
@@ -321,8 +323,13 @@ def align(
         raise UsageError(
             f"aid holds two of one type: {', '.join(type(a).__name__ for a in given)}; expected one of each"
         )
+    log, unsaid = ImuRecord.of(record), tuple[Evidence, ...]()
+    if imu is not None and (said := imu_spec(imu)).unsaid:
+        from truenorth.alignment.unsaid import completed
+
+        imu, unsaid = completed(said, log, stays=aids.keys() <= {Indexer, Positions})
     request = Request(
-        ImuRecord.of(record),
+        log,
         None if place is None else Position.of(place),
         imu,
         aids,
@@ -345,7 +352,8 @@ def align(
             f"at={at:g}: with {recipe.name} the attitude holds at the log's end; cut the log there instead"
         )
     try:
-        return recipe(request)
+        answer = recipe(request)
+        return replace(answer, evidence=(*answer.evidence, *unsaid)) if unsaid else answer
     except TypeError as error:
         refused = (
             "unexpected keyword argument",

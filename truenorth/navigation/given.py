@@ -10,9 +10,12 @@ import numpy as np
 
 from truenorth.aiding.aids import ANTENNA, Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
+from truenorth.alignment.unsaid import unsaid_evidence
 from truenorth.core.errors import UsageError
 from truenorth.navigation.result import Altitude
-from truenorth.state.evidence import Evidence, note
+from truenorth.records import Late
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import ANTENNA_ARM
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
@@ -77,6 +80,17 @@ def _says_the_same(key: str, given: Mounting, found: Mounting) -> bool:
         own, other = ((m.latency, m.latency_sigma, m.velocities) for m in (given, found))
         return own == other
     return given.scale_sigma == found.scale_sigma and bool(np.all(given.C_mb == found.C_mb))
+
+
+def said_of(given: Mapping[str, Any], spec: ImuSpec) -> list[Evidence]:
+    """What the readers of the aids' logs have to say of them, and what a specification does not name."""
+    return [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))] + [*unsaid_evidence(spec)]
+
+
+def late_rows(given: Mapping[str, Any]) -> dict[str, Late]:
+    """Of the aids whose logs have rows that came late."""
+    late = {key: getattr(a.record, "late", None) for key, a in given.items()}
+    return {key: found for key, found in late.items() if found is not None and found.rows}
 
 
 def kind_of_log(given: Mapping[str, Any]) -> list[Evidence]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.alignment.recipes import align
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.unsaid import as_usual
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm, euler_jacobian
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
@@ -190,7 +191,8 @@ def known_start(
     AlignmentError
         The vehicle moves from the first seconds on, and no level is given.
     """
-    log, spec, at = ImuRecord.of(record), imu_spec(imu), Position.of(place)
+    log, at = ImuRecord.of(record), Position.of(place)
+    spec = as_usual(imu_spec(imu), log)
     if (pitch is None) != (roll is None):
         raise UsageError("pitch or roll is given alone; expected both, or none: the level then comes from the log")
     if pitch is None or roll is None:

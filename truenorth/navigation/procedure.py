@@ -33,9 +33,11 @@ from truenorth.navigation.given import (
     by_key,
     kept_altitude,
     kind_of_log,
+    late_rows,
     looked_at,
     mounted_as,
     record_of,
+    said_of,
     taken_over,
 )
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
@@ -52,10 +54,10 @@ from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
-from truenorth.records import GnssRecord, ImuRecord, Late
+from truenorth.records import GnssRecord, ImuRecord
 from truenorth.records.specified import corrected, seen_in
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import Evidence, note, notes
+from truenorth.state.evidence import Evidence, note
 from truenorth.state.layout import SLOW_ACCEL, SLOW_GYRO
 from truenorth.state.state import Start
 from truenorth.state.track import Track
@@ -71,7 +73,6 @@ LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then eve
 FINE = 0.2
 DAMPED = 8.0  # s: rows of a track that damping goes on from are no farther apart
 MOMENT = 1800.0  # s of a log, that show whether gyros and accelerometers are of one moment
-NEVER = Late(0, 0.0)
 PLUMB_LINE = Deflection()
 
 
@@ -197,8 +198,7 @@ def _by_specification(
     check_start_at_rest(begin, record)
     record, gaps, disturbances = bridge_gaps(record)
     noise = seen_in(with_rounding(spec, log, aided=bool(given) and damping is None), record)
-    said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
-    late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
+    said, late = said_of(given, spec), late_rows(given)
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     begin = arm_as_begun(begin, getattr(given.get(Gnss.key), "mounting", None))

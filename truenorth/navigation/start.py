@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.unsaid import as_usual
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION, normal_gravity
 from truenorth.core.errors import AlignmentError, DataError, UsageError
@@ -37,7 +38,7 @@ SUMMARY = "summary.json"
 
 def start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
     """Where navigation begins, the specification, and where that comes from; arguments as for :func:`truenorth.navigate`."""
-    spec = None if imu is None else imu_spec(imu)
+    spec = None if imu is None else as_usual(imu_spec(imu))
     if isinstance(start, Start):
         if spec is None:
             raise UsageError(

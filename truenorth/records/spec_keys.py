@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -71,8 +72,25 @@ PLAIN = {"gyro": ("filter_order",), "accel": ("filter_order", "positions"), "tem
 CORRELATION_TIME = Entry("time", "s", "above zero")
 ENTRIES = {(group, key): entry for group, keys in KEYS.items() for key, entry in keys.items()}
 ENTRIES["", "correlation_time"] = CORRELATION_TIME
+# Terms that no IMU is without: each of a sensor, by its own name and by others that stand for it.
+ALWAYS = (
+    ("random_walk", "sample_noise"),
+    ("bias", "turn_on_bias"),
+    ("bias_instability", "rate_random_walk"),
+    ("scale_factor",),
+    ("misalignment",),
+)
 
 
 def field_of(group: str, key: str) -> str:
     """The field of a specification that a key stands for."""
     return f"{group}_{key}" if group else key
+
+
+def unnamed(fields: Iterable[str]) -> tuple[str, ...]:
+    """Fields of the terms that no IMU is without, where none of these fields stands for the term."""
+    given = set(fields)
+    pairs = [(sensor, terms) for sensor in ("gyro", "accel") for terms in ALWAYS]
+    return tuple(
+        f"{sensor}_{terms[0]}" for sensor, terms in pairs if not given & {f"{sensor}_{term}" for term in terms}
+    )

@@ -8,6 +8,9 @@ A file holds groups of keys, each value with its unit:
     temperature: {start: -10 K, rate: 1 K/min, time_constant: 20 min}
     correlation_time: 5 min
 
+A term that a file does not name is not zero: alignment and navigation take for possible what is usual
+(:mod:`truenorth.alignment.unsaid`), unless the file says ``unnamed: zero``. A simulation makes no error that is not named.
+
 What each term does to a measurement is written in :mod:`truenorth.simulation.imu_errors`.
 """
 
@@ -15,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cache, cached_property
 from os import PathLike
@@ -29,7 +32,7 @@ from truenorth.core.paths import as_path
 from truenorth.core.units import format as format_quantity
 from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
 from truenorth.records.presets import PRESETS
-from truenorth.records.spec_keys import CORRELATION_TIME, ENTRIES, KEYS, PLAIN, WANTED, Entry, field_of
+from truenorth.records.spec_keys import CORRELATION_TIME, ENTRIES, KEYS, PLAIN, WANTED, Entry, field_of, unnamed
 from truenorth.records.vibration import coning_left
 
 if TYPE_CHECKING:
@@ -43,7 +46,7 @@ Places = tuple[tuple[float, float, float], tuple[float, float, float], tuple[flo
 
 @dataclass(frozen=True)
 class ImuSpec:
-    """Errors of one IMU, one-sigma for each axis; zero where a datasheet is silent.
+    """Errors of one IMU, one-sigma for each axis.
 
     Attributes
     ----------
@@ -87,6 +90,8 @@ class ImuSpec:
     correlation_time : float, s
         Of the bias instabilities.
     name : str
+    unsaid : tuple of str
+        Fields that a file or a mapping does not name; empty where the specification is made of numbers.
     """
 
     gyro_bias: float = 0.0
@@ -128,6 +133,7 @@ class ImuSpec:
     temperature_time_constant: float = math.inf
     correlation_time: float = 300.0
     name: str = "custom"
+    unsaid: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         where = f"IMU specification {self.name!r}"
@@ -203,9 +209,14 @@ class ImuSpec:
     def to_mapping(self) -> dict[str, Any]:
         """The specification as it stands in a file; only what differs from a perfect IMU."""
         result: dict[str, Any] = {"name": self.name}
+        silent = unnamed(name for key in ENTRIES if getattr(self, name := field_of(*key)))  # in a file without zeros
+        if silent and not self.unsaid:
+            result["unnamed"] = "zero"
         for (group, key), entry in ENTRIES.items():
-            value = getattr(self, field_of(group, key))
-            if value in (0.0, math.inf):
+            name = field_of(group, key)
+            value = getattr(self, name)
+            none = bool(self.unsaid) and name in silent and name not in self.unsaid
+            if value in (0.0, math.inf) and not none:
                 continue
             text = format_quantity(value, entry.unit, digits=None)
             if group:
@@ -285,7 +296,7 @@ def _from_kalibr(content: Mapping[Any, Any], where: str, name: str) -> ImuSpec:
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
             raise DataError(f"{where}: {theirs}: {value!r}; expected a number in SI, zero or more")
         values[ours] = float(value)
-    return ImuSpec(**values)
+    return ImuSpec(**values, unsaid=unnamed(values))
 
 
 def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
@@ -298,14 +309,19 @@ def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
     if set(KALIBR) <= set(content):
         return _from_kalibr(content, where, name)
     values: dict[str, Any] = {"name": str(content.get("name", name))}
+    rest = content.get("unnamed", "usual")
+    if rest not in ("usual", "zero"):
+        raise DataError(
+            f"{where}: unnamed: {rest!r}; expected usual or zero: what the terms are that the file does not name"
+        )
     for group, entries in content.items():
-        if group == "name":
+        if group in ("name", "unnamed"):
             continue
         if group == "correlation_time":
             values[group] = _value(entries, CORRELATION_TIME, f"{where}: {group}")
             continue
         if group not in KEYS:
-            raise DataError(unknown_key(where, str(group), [*KEYS, "name", "correlation_time"]))
+            raise DataError(unknown_key(where, str(group), [*KEYS, "name", "unnamed", "correlation_time"]))
         if not isinstance(entries, Mapping):
             raise DataError(
                 f"{where}: {group}: expected keys such as {', '.join([*KEYS[group]][:3])}, found {entries!r}"
@@ -320,7 +336,7 @@ def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
                 values["accel_positions"] = _places(text, f"{where}: {path}")
             else:
                 values[f"{group}_{key}"] = _order(text, f"{where}: {path}")
-    return ImuSpec(**values)
+    return ImuSpec(**values, unsaid=() if rest == "zero" else unnamed(values))
 
 
 def _value(text: Any, entry: Entry, where: str) -> float:

@@ -12,6 +12,7 @@ A file holds quantities with their units, and what it leaves out has the default
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from functools import cached_property
 from importlib import resources
@@ -122,12 +123,12 @@ class Scenario(Strict):
 
     @cached_property
     def imu_spec(self) -> ImuSpec:
-        """The IMU, in SI."""
+        """The IMU, in SI: what is not named is not simulated."""
         if self.imu is None:
             return ImuSpec(name="ideal")
         if isinstance(self.imu, str) and is_file(self._folder / self.imu):
-            return imu_spec(self._folder / self.imu)
-        return imu_spec(self.imu)
+            return replace(imu_spec(self._folder / self.imu), unsaid=())
+        return replace(imu_spec(self.imu), unsaid=())
 
     def build_motion(self, seed: int | None = None, run: int = 0, number: int = 0) -> Motion:
         """The motion of a run.

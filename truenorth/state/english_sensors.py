@@ -118,6 +118,20 @@ OF_SENSORS = {
         "far more than the specification ({imu:imu}) says: a vehicle that vibrates, or another sensor; the answer counts it, and "
         "such noise hides other errors, as of gyros that are late"
     ),
+    "specification.gyro_unsaid": (
+        "the specification ({imu:imu}) does not name all errors of the gyros: as of sensors with such noise, a bias of "
+        "{bias:deg/h|.2g} deg/h, scale factors of {scale:ppm|.2g} ppm and misalignments of {misalignment:arcmin|.2g} arcmin are "
+        "possible (one sigma)"
+    ),
+    "specification.accel_unsaid": (
+        "the specification ({imu:imu}) does not name all errors of the accelerometers: as of sensors with such noise, a bias of "
+        "{bias:ug|.2g} ug, scale factors of {scale:ppm|.2g} ppm and misalignments of {misalignment:arcmin|.2g} arcmin are possible "
+        "(one sigma)"
+    ),
+    "specification.noise_alone": (
+        "the specification ({imu:imu}) names no bias of the gyros: the errors of the IMU are inferred from the log instead; name "
+        "one, 0 deg/h where there is none"
+    ),
     "specification.suspect": (
         "the specification ({imu:imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"
     ),
