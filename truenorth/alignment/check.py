@@ -204,11 +204,12 @@ def is_blind(motion: MotionSummary, check: LogCheck) -> bool:
     return float(np.hypot(*check.rate_residual)) > max(BLIND_RATE, noise)
 
 
-def is_lost(task: Task, check: LogCheck, spec: ImuSpec | None, heading_limit: float) -> bool:
+def is_lost(task: Task, check: LogCheck, spec: ImuSpec | None, heading_limit: float, *, inferred: bool = False) -> bool:
     """Whether the gyros of a still base hold no heading, and wander by more than a linear filter of the whole log can follow.
 
     By the scatter of their means; or by a specification whose biases leave heading less known than is wanted, where the tilt that
-    they walk, squared, is more of gravity than the noise of the accelerometers. These level such a base by themselves.
+    they walk, squared, is more of gravity than the noise of the accelerometers. These level such a base by themselves. `inferred`:
+    whether the specification is that of the log: gyros that warm up pass for noise there, and how far they walk is not known.
     """
     if task.motion.overall != "still" or task.motion.fraction("rotating") > 0.0:
         return False
@@ -217,6 +218,8 @@ def is_lost(task: Task, check: LogCheck, spec: ImuSpec | None, heading_limit: fl
         return True
     if spec is None or math.sqrt(float(spec.bias_variance[0])) < north * math.sin(min(heading_limit, 0.5 * math.pi)):
         return False
+    if inferred:
+        return True
     walks, T = Walks.of(spec), task.record.duration
     tilt = walks.gyro_rate_walk * math.sqrt(T**3 / 3.0)
     return task.gravity * 0.5 * tilt**2 > walks.accel_random_walk / math.sqrt(T)

@@ -25,6 +25,7 @@ COVER = 0.05  # s by which an encoder's log may begin late or end early
 ROUNDING = 1e-3  # of a row, by which stamps of one moment differ: beyond the edges the gyros say nothing
 FEWEST = 4  # rows that a spline needs
 MOST_DIFFERENCES = 8
+NONE = (np.empty(0), np.empty((0, 0)))
 PASSES = 2  # the direction of an outer axis in the IMU is known by straight lines at first
 
 
@@ -44,6 +45,10 @@ class CarriedAngles:
         RMS of the body's angular acceleration about the axes, which they do not know of there.
     noise : float, rad
         White noise of the encoder's rows, steps of its resolution included while it turns.
+    time : (N,) array, s
+        Of the encoder's rows.
+    turned : (N, A) array, rad
+        By which the angles there turn more than the gyros about the axes: the turn of the body.
     """
 
     record: EncoderRecord
@@ -51,6 +56,8 @@ class CarriedAngles:
     step: float
     swing: float
     noise: float
+    time: Array
+    turned: Array
 
     def sigma(self, time: float) -> float:
         """One sigma at a time (s), rad: noise of the rows, and what the body may have turned since the last one.
@@ -91,7 +98,7 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     rows = (encoder.time >= edges[0] - slack) & (encoder.time <= edges[-1] + slack)
     if np.count_nonzero(rows) < FEWEST:
         return CarriedAngles(
-            replace(encoder, time=edges, angles=_shaped(angles)), float(encoder.time[-1]), math.inf, 0.0, 0.0
+            replace(encoder, time=edges, angles=_shaped(angles)), float(encoder.time[-1]), math.inf, 0.0, 0.0, *NONE
         )
     time = encoder.time[rows]
     given = angles_at(encoder, time, axes)
@@ -108,7 +115,7 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     swing = float(np.sqrt(np.max(np.mean(of_body(time, 2) ** 2, axis=0))))
     noise, step = _white(own), float(np.median(np.diff(time)))
     carried = replace(encoder, time=edges, angles=_shaped(angles))
-    return CarriedAngles(carried, float(time[-1]), step, swing, noise)
+    return CarriedAngles(carried, float(time[-1]), step, swing, noise, time, own)
 
 
 def _white(y: Array) -> float:

@@ -159,7 +159,7 @@ def align_base(
         found = _Found(*from_means(task, spec))
     else:
         found = _align_inertial(task, spec, chosen, means, sound)
-        if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit):
+        if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit, inferred=True):
             chosen, why, found = "analytic", NO_NORTH, _Found(*level_from_means(task, spec))
         elif method == "auto" and spec is None and was_blind(task, found.answer.imu):
             chosen, why, found = "kalman", TURNS_BLINDLY, _align_turning(task, spec)

@@ -44,6 +44,7 @@ from truenorth.core.position import Position
 from truenorth.errors.staying import StaticModel
 from truenorth.quality.codes import codes_evidence
 from truenorth.quality.encoder import encoder_evidence, zero_evidence
+from truenorth.quality.encoder_jumps import jump_evidence
 from truenorth.quality.hum import hum_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
@@ -177,6 +178,7 @@ def align_rotary(
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
     evidence = _of_encoder(record, encoder, axes, task, spec)
+    evidence += [] if encoder is None else jump_evidence(carried.time, carried.turned)
     evidence += _of_filter(answer, fine, spec, task, given=given is not None)
     if isinstance(fine, SwayAlignment):
         anew = aligned_anew(fine, start, mount, _turned(spec))

@@ -124,6 +124,13 @@ def _zero(name: str, axis: int) -> Fault:
     return _angles(name, spoil)
 
 
+def _slipping(angles: Array, rng: Rng) -> tuple[Array, str]:
+    axis, row, off = int(rng.integers(2)), int(rng.uniform(0.1, 0.9) * len(angles)), over_decades(rng, 0.02, 5.0)
+    slipped = angles.copy()
+    slipped[row:, axis] += rng.choice([-1.0, 1.0]) * math.radians(off)
+    return slipped, f"{off:.2f} deg of the {('outer', 'inner')[axis]} axis"
+
+
 def _speed_unit(record: Any, rng: Rng, field: str) -> tuple[Any, str]:
     unit, k = (("km/h", 3.6), ("knots", 1.9438), ("cm/s", 100.0))[int(rng.integers(3))]
     return replace(record, **{field: k * getattr(record, field)}), unit
@@ -207,6 +214,7 @@ AID_FAULTS: tuple[Fault, ...] = (
     _angles("encoder in degrees", lambda angles, rng: (np.degrees(angles), "both")),
     _zero("zero of the outer angle", 0),
     _zero("zero of the inner angle", 1),
+    _angles("encoder slips", _slipping),
     of_log("encoder clock rate", "encoder", clock_rate),
     of_log("late encoder", "encoder", _shifted),
     _master("late master", _late_master),

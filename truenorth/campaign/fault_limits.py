@@ -48,9 +48,10 @@ BY_MEANS = (
     "times the square of that angle"
 )
 BY_LATENCY = (
-    "measured, trial by trial: the master's velocities prefer gyros of one moment by less than 25 (the same ratio). Gyros that are "
-    "late by d turn heading by d times the rate while a turn lasts; straight flight shows a master by velocity no heading, so that "
-    "only one turn against another, of a delay of the slave that is not known either, tells it from one"
+    "measured, trial by trial: the master's measurements prefer gyros of one moment by less than 25 (the same ratio). Gyros that "
+    "are late by d turn heading by d times the rate while a turn lasts; straight flight shows a master by velocity no heading, so "
+    "that only one turn against another, of a delay of the slave that is not known either, tells it from one. By attitude as well "
+    "a delay of milliseconds is less than what the master's attitudes scatter by"
 )
 BY_SIGN = (
     "measured, trial by trial: the master's velocities prefer the gyro of the right sign by less than 25 (the same ratio). In "
@@ -111,8 +112,8 @@ def unseen(procedure: str, fault: str, size: str, ratio: float | None = None) ->
     seldom = fault in LIKE_MOTION or (procedure in ON_THE_MOVE and fault in AXES)
     if measured and procedure not in REST and seldom:
         return f"the measurements prefer the true sensors by {ratio:.1f} only"
-    if measured and procedure == "transfer" and fault in LATE:
-        return f"the master's velocities prefer gyros of one moment by {ratio:.1f} only"
+    if measured and procedure in ("transfer", "attitude") and fault in LATE:
+        return f"the master's measurements prefer gyros of one moment by {ratio:.1f} only"
     if measured and procedure == "transfer" and fault in SIGNS:
         return f"the master's velocities prefer the gyro of the right sign by {ratio:.1f} only"
     known = next((u for u in UNSEEN if procedure in u.procedures and fault == u.fault and re.match(u.size, size)), None)

@@ -141,7 +141,7 @@ def _unseen() -> list[str]:
     lines.append(f"| {', '.join(LIKE_HEADING)} | {', '.join(REST)} | {BY_MEANS} |")
     biases = [name for name in LIKE_MOTION if name.startswith(("gyro", "accel"))]
     lines.append(f"| {', '.join(biases)} | swaying | {BY_STAYING} |")
-    lines.append(f"| {', '.join(LATE)} | transfer | {BY_LATENCY} |")
+    lines.append(f"| {', '.join(LATE)} | transfer, attitude | {BY_LATENCY} |")
     lines.append(f"| {', '.join(SIGNS)} | transfer | {BY_SIGN} |")
     return [*lines, f"| {', '.join((*LIKE_MOTION, *AXES))} | {', '.join(ON_THE_MOVE)} | {BY_LIKELIHOOD} |"]
 

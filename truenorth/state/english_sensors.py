@@ -152,6 +152,10 @@ OF_SENSORS = {
         "with these angles of the indexer the base turns by {net:deg|.0f} deg from the first third of the log to the last "
         "({rate:deg/s|.2g} deg/s RMS): no base that stays does"
     ),
+    "encoder.jumps": (
+        "angle {axis} of the encoder jumps by {size:deg|+.3f} deg at {time:.1f} s, where the gyros see no turn of that axis: it "
+        "slips, or its count was set anew"
+    ),
     "encoder.zero": (
         "the zero of the inner axis' angle is off by {off:deg|+.3f} ± {sigma:deg|.3f} deg, or the encoder is late or early: the "
         "base would wobble as the outer axis turns"

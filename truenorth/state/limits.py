@@ -101,6 +101,11 @@ LIMITS: dict[str, Limit] = {
         "sigma",
         "of a wobble of the zero of an indexer's angles: sway is alike from turn to turn, which sigma does not know",
     ),
+    "jump of an encoder": Limit(
+        12.0,
+        "sigma of a row's noise",
+        "a thousandth of that of 48 h at 100 Hz by chance, were it normal; starts and stops of an axis have longer tails",
+    ),
     "few turns": Limit(2e-4, "1", "false alarms of a sound indexer, of whose few turns that sigma is estimated"),
     "start at rest": Limit(
         8.0,

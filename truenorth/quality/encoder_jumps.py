@@ -1,0 +1,92 @@
+"""An encoder that slips: from one row to the next an angle jumps, and the gyros of the IMU on the axis see no turn.
+
+What the encoder turns more than the gyros about its axes is the turn of the base, which is smooth: differences of a high order
+leave noise of it. A jump stands out there by its own pattern.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.quality.encoder import USUAL_ZERO
+from truenorth.state.evidence import Effect, Evidence, Figure, Kind
+from truenorth.state.limits import limit
+
+Array = NDArray[np.float64]
+
+ORDERS = range(2, 9)  # of differences: each leaves less of the base's motion, and more noise
+LEAST = 4  # a cubic goes on across the rows of a jump
+FEWEST = 50  # rows that show what their noise is
+SELDOM = 0.02  # of the rows: what is more frequent is noise
+BEYOND = 2.326  # sigmas, that a normal variable exceeds as seldom
+
+
+def jump_evidence(time: Array, turned: Array) -> list[Evidence]:
+    """Jumps of an encoder's angles.
+
+    Parameters
+    ----------
+    time : (N,) array, s
+        Of the encoder's rows.
+    turned : (N, A) array, rad
+        By which each angle turns more than the gyros about its axis.
+    """
+    if len(time) < FEWEST:
+        return []
+    found = []
+    for axis, x in enumerate(turned.T):
+        for first, size in _jumps(x):
+            figures: dict[str, Figure] = {"axis": str(axis + 1), "size": size, "time": float(time[first])}
+            kind: Kind = "bounded" if abs(size) > USUAL_ZERO else "known"
+            found.append(Evidence("encoder.jumps", figures, kind, Effect(abs(size), abs(size)), ("encoder",)))
+    return found
+
+
+def _jumps(x: Array) -> list[tuple[int, float]]:
+    """Rows from which on an angle is another, and by how much, rad: what comes back within some rows is left out."""
+    order = min(ORDERS, key=lambda n: _scale(_steps(x, n)))
+    size = _steps(x, order)
+    sigma = _scale(size)
+    rows = np.flatnonzero(np.abs(size) > limit("jump of an encoder") * sigma) if sigma > 0.0 else np.empty(0, int)
+    if not rows.size:
+        return []
+    cuts = [0, *(np.flatnonzero(np.diff(rows) > order) + 1), rows.size]
+    found = []
+    for part in (rows[a:b] for a, b in pairwise(cuts)):
+        net, its_sigma = _stays(x, int(part[0]), int(part[-1]), order)
+        if abs(net) > limit("jump of an encoder") * max(sigma, its_sigma):
+            found.append((int(part[np.argmax(np.abs(size[part]))]), net))
+    return found
+
+
+def _stays(x: Array, first: int, last: int, order: int) -> tuple[float, float]:
+    """By how much `x` has jumped from before a row to behind another, and its sigma: a step of a polynomial on both sides."""
+    order = max(order, LEAST)
+    side = order + 2
+    rows = np.r_[max(first - side, 0) : first, last : min(last + side, len(x))]
+    behind = rows >= last
+    if behind.all() or not behind.any():
+        return 0.0, math.inf
+    where = (rows - rows[0]) / (rows[-1] - rows[0]) * 2.0 - 1.0
+    A = np.column_stack([behind, np.polynomial.legendre.legvander(where, order - 1)])
+    fitted, *_ = np.linalg.lstsq(A, x[rows])
+    left = float(np.sum((x[rows] - A @ fitted) ** 2)) / max(len(rows) - A.shape[1], 1)
+    return float(fitted[0]), math.sqrt(left * float(np.linalg.inv(A.T @ A)[0, 0]))
+
+
+def _steps(x: Array, order: int) -> Array:
+    """(N,) by how much `x` jumps at each row, by least squares on its differences of an order; zero near its ends."""
+    pattern = np.array([(-1.0) ** i * math.comb(order - 1, i) for i in range(order)])
+    fitted = np.convolve(np.diff(x, order), pattern[::-1], "valid") / float(pattern @ pattern)
+    size = np.zeros(len(x))
+    size[order : order + len(fitted)] = fitted
+    return size
+
+
+def _scale(size: Array) -> float:
+    """One sigma of normal noise, by the size that one row in fifty exceeds: steps of a coarse resolution count, a jump does not."""
+    return float(np.quantile(np.abs(size), 1.0 - SELDOM)) / BEYOND
