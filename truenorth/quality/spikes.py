@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.quality.knocks import sums_of_answer
-from truenorth.quality.quantum import lattice
+from truenorth.quality.quantum import largest_step, lattice
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -43,8 +43,6 @@ SAME = 0.5  # of the spike, by which the values before and behind it may differ,
 MOST = 0.1  # of the rows: more are no single ones
 NEAR = 4.0  # sigmas, from which on rows are asked for their signs: one in 16,000 by chance
 FEWEST = 3  # spikes
-FEW = 500  # rows, of which the gaps between values are looked at
-RANGE = 1e-9  # of the values: those that are closer are one
 SUMS = (8, 32, 128, 512)  # rows, of which sums show whether remainders are carried on
 BLOCKS = 8  # such sums at least
 CARRIED = 0.6  # of their scatter without spikes, that pulses of a counter leave at the most
@@ -165,7 +163,8 @@ def one_sided(values: Array, interval: float) -> OneSided | None:
         if len(at) < FEWEST:
             continue
         alone = np.abs(values[at] - said)
-        alone = alone > far * _step_of(values, float(alone.min()) / far)
+        bound = largest_step(values)
+        alone = alone > far * (bound if far * bound < alone.min() else lattice(values)[0])
         at, said = at[alone], said[alone]
         size = values[at] - said
         total = float(size.sum())
@@ -174,16 +173,6 @@ def one_sided(values: Array, interval: float) -> OneSided | None:
             kind = _kind(values, at, said, interval)
             return None if kind is None else OneSided(kind, len(at), total / len(values))
     return None
-
-
-def _step_of(values: Array, least: float) -> float:
-    """The step of a counter (zero: there is none), where it may be as large as `least`; else a figure that is smaller.
-
-    No step is larger than any gap between values: a few of them show that most channels have none that matters.
-    """
-    apart = np.diff(np.sort(values[:FEW]))
-    apart = apart[apart > RANGE * np.ptp(values)]
-    return float(apart.min()) if apart.size and apart.min() < least else lattice(values)[0]
 
 
 def _kind(values: Array, at: Rows, said: Array, interval: float) -> Kind | None:
