@@ -59,7 +59,8 @@ def test_a_sound_log_passes(waiting) -> None:
 
 def test_gyros_whose_axes_are_exchanged_miss_the_earths_rate(waiting) -> None:
     record, gnss, spec = waiting
-    answer = align(replace(record, gyro=record.gyro[:, [0, 2, 1]]), imu=spec, aid=Gnss(gnss))
+    short = record.between(None, 60.0)  # behind each rival stands a navigation, and a longer log has more of them
+    answer = align(replace(short, gyro=short.gyro[:, [0, 2, 1]]), imu=spec, aid=Gnss(gnss))
     assert answer.status == "inconsistent"
     assert any(item.key == "rate.misses" for item in answer.evidence)
 

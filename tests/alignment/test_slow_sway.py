@@ -80,7 +80,7 @@ def test_sound_sensors_are_not_called_noisy_on_a_slow_sway(seed: int) -> None:
     assert not any(item.key.startswith("specification.") for item in answer.evidence)
 
 
-@pytest.mark.parametrize("seed", [6, *some([], [7, 8, 9])])
+@pytest.mark.parametrize("seed", some([7], [6, 8, 9]))
 def test_nor_are_they_where_a_ship_at_her_moorings_goes_in_many_tones(seed: int) -> None:
     """Above the sway they look white, and are as quiet as specified: what is slow and louder is a motion."""
     inputs, _ = _moored(seed, period=80.0, amplitude=0.3, duration=240.0, tones_each=6)

@@ -50,6 +50,7 @@ TURN_ARM = 1.0  # m, one sigma along each axis: from the axis of a turntable to 
 TURNED = 3.0  # how much of a correction the next pass may move, for each radian that the linearisation turns; twice the most seen
 LEVEL = slice(PHI.start, PHI.stop - 1)
 SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at least
+EXPLAINED = 2.0  # times what accelerometers make by themselves: less is begun with as no motion, which most filters then confirm
 
 
 @dataclass(frozen=True)
@@ -233,6 +234,8 @@ def settle_fine(
     )
     if form == "velocity":
         R = white_variance(mean_velocity(log.integrals, C_n0_i, position.lat, position.alt))
+        own = model.accel_random_walk**2 * interval / 3.0
+        R = np.where(EXPLAINED * own > R, QUIETEST_BASE**2, R)
     else:
         expected = model.accel_random_walk**2 * interval
         gained = gained_velocity(log.integrals, C_n0_i, position.lat, position.alt)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
-from truenorth.quality.other_counts import counts_in_turn
+from truenorth.quality.other_counts import counts_in_turn, has_many_levels
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit
@@ -203,5 +203,7 @@ def _turned(record: ImuRecord, period: int, stretches: int) -> float:
 
 def _step(values: Array) -> float:
     """The smallest step between two values of a channel that is written in few levels; zero of one that has as many as rows."""
+    if has_many_levels(values, 0.25):
+        return 0.0
     levels = np.unique(values)
     return float(np.diff(levels).min()) if 1 < len(levels) < len(values) // 4 else 0.0

@@ -41,7 +41,10 @@ class Pile(NamedTuple):
 
 def piled_up(values: Array) -> Pile | None:
     """The value of a channel (N,) that has the rows of the largest hole; None where there is no such hole."""
-    levels, counts = np.unique(values, return_counts=True)
+    least, ordered = math.ceil(PART * LEAST), np.sort(values)
+    if not np.any(ordered[least - 1 :] == ordered[: len(ordered) - least + 1]):
+        return None  # no value has so many rows
+    levels, counts = np.unique(ordered, return_counts=True)
     if len(levels) < 2 * LEVELS + 1:
         return None
     before = np.append(0, np.cumsum(counts))  # rows below each level

@@ -33,6 +33,8 @@ def counts_in_turn(record: ImuRecord, period: int) -> bool:
 def _in_turn(values: Array, period: int) -> bool:
     turns = [values[k::period] for k in range(period)]
     for k, own in enumerate(turns):
+        if has_many_levels(own, LEVELS):
+            continue
         levels = np.unique(own)
         if not FEWEST <= len(levels) <= LEVELS * len(own):
             continue
@@ -43,6 +45,12 @@ def _in_turn(values: Array, period: int) -> bool:
         if any(np.mean(np.abs(_beyond((x - levels[0]) / step)) > OFF) > MOST for x in others):
             return True
     return False
+
+
+def has_many_levels(values: Array, share: float) -> bool:
+    """Whether the first rows of a channel (N,) show that it has more levels than this share of its rows: those of most do."""
+    some = np.sort(values[: int(share * len(values)) + 1])
+    return len(some) > 0 and bool(np.all(some[1:] > some[:-1]))
 
 
 def _beyond(counts: Array) -> Array:

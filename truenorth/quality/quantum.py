@@ -28,6 +28,7 @@ LATTICE = 1e-3  # of a step, by which values may miss multiples of it
 SAME = 1e-9  # of the range: values that are closer are one, but for the last digits
 SUMS = (1, 2, 4, 8, 16, 32)  # rows that are summed up to see whether remainders are carried on
 FEWEST = 50  # of such sums
+SOME = 2000  # rows, of which the gaps between values are looked at first
 QUIET = 0.98  # of the rows near the fullest level: where more are not, motion moves the channel over many steps
 NEGLIGIBLE = 1e-3  # of a step
 CARRIED = 0.6  # of what independent rows would scatter: sums that do less have their remainders carried on
@@ -90,6 +91,12 @@ def lattice(values: Array) -> tuple[float, Array]:
     if np.any(np.abs(off - place) > LATTICE * np.maximum(np.abs(place), 1.0)):
         return 0.0, np.zeros(0)
     return step, np.round((values - fullest) / step)
+
+
+def largest_step(values: Array) -> float:
+    """The largest step that a channel (N,) can have: no gap between values is less than one; those of some rows are looked at."""
+    apart = np.diff(np.sort(values[:SOME]))
+    return float(np.min(apart[apart > SAME * np.ptp(values)], initial=math.inf))
 
 
 def _carries(counts: Array) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import GRAVITY_EQUATOR
-from truenorth.quality.quantum import lattice
+from truenorth.quality.quantum import largest_step, lattice
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.limits import limit
@@ -56,6 +56,8 @@ def rolled_over_evidence(record: ImuRecord) -> list[Evidence]:
     channel = int(np.argmax(np.abs(force)))
     if abs(unit * float(force[channel])) < (1.0 - limit("gravity")) * GRAVITY_EQUATOR:
         return []
+    if np.max(np.abs(record.accel)) > 2.0 ** max(BITS) * max(largest_step(x) for x in record.accel.T):
+        return []  # steps so small are of no such counter
     counts = counts_of(record.accel)
     if counts is None or _is_text(float(np.max(np.abs(record.accel)) / np.max(np.abs(counts)))):
         return []

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.quality.knocks import sums_of_answer
-from truenorth.quality.quantum import lattice
+from truenorth.quality.quantum import largest_step, lattice
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -63,7 +63,29 @@ class Spikes(NamedTuple):
     said: Array
 
 
-def spikes_of(values: Array, interval: float, far: float = FAR) -> Spikes:
+class Sizes(NamedTuple):
+    """Of a channel: by how much its rows, but for three at either end, miss what their neighbours say."""
+
+    said: Array
+    size: Array
+    usual: Array  # one sigma of that, about each row
+
+
+def sizes_of(values: Array, interval: float) -> Sizes | None:
+    """By how much rows of a channel (N,) miss what their neighbours say; None of fewer rows than are compared."""
+    rows = max(round(STRETCH / interval), 2 * HALF + 1)
+    if len(values) < rows:
+        return None
+    said = np.convolve(values, NEIGHBOURS, mode="valid")
+    size = np.abs(values[HALF:-HALF] - said)
+    usual, last = np.empty(len(size)), _last_stretch(len(size), rows)
+    if last:
+        usual[:last] = np.repeat(np.median(size[:last].reshape(-1, rows), axis=1) / MEDIAN, rows)
+    usual[last:] = np.median(size[last:]) / MEDIAN
+    return Sizes(said, size, usual)
+
+
+def spikes_of(values: Array, interval: float, far: float = FAR, sizes: Sizes | None = None) -> Spikes:
     """Spikes of a channel (N,) whose rows are so many seconds apart; none where they are no single rows.
 
     Parameters
@@ -72,19 +94,19 @@ def spikes_of(values: Array, interval: float, far: float = FAR) -> Spikes:
     interval : float, s
     far : float
         Sigmas by which they stand out.
+    sizes : Sizes, optional
+        Of the channel, where they are known already.
     """
     none = Spikes(np.empty(0, dtype=np.intp), np.empty(0))
-    rows = max(round(STRETCH / interval), 2 * HALF + 1)
-    if len(values) < rows:
+    if sizes is None:
+        sizes = sizes_of(values, interval)
+    if sizes is None:
         return none
-    said = np.convolve(values, NEIGHBOURS, mode="valid")
-    size = np.abs(values[HALF:-HALF] - said)
-    usual = np.empty(len(size))
-    for part in _stretches(len(size), rows):
-        usual[part] = np.median(size[part]) / MEDIAN
-    largest = np.max([np.roll(size, shift) for shift in range(-HALF, HALF + 1)], axis=0)
-    at = np.flatnonzero((size > far * usual) & (usual > 0.0) & (size >= largest))
-    at = HALF + at[(at > 0) & (at < len(size) - 1)]
+    said, size, usual = sizes
+    at = np.flatnonzero((size > far * usual) & (usual > 0.0))
+    at = at[(at > 0) & (at < len(size) - 1)]
+    around = (at[:, None] + np.arange(-HALF, HALF + 1)) % len(size)
+    at = HALF + at[size[at] >= size[around].max(axis=1)]
     near, far_off = (
         0.5 * sum(values[at + lag] - values[at - lag] for lag in lags) for lags in ((1, 2), (HALF, HALF + 1))
     )
@@ -94,10 +116,9 @@ def spikes_of(values: Array, interval: float, far: float = FAR) -> Spikes:
     return none if len(at) > MOST * len(values) else Spikes(at, said[at - HALF])
 
 
-def _stretches(count: int, rows: int) -> list[slice]:
-    """So many rows each, the last with what is left."""
-    starts = range(0, max(count - rows // 2, 1), rows)
-    return [slice(start, start + rows if start != starts[-1] else count) for start in starts]
+def _last_stretch(count: int, rows: int) -> int:
+    """Where the last of stretches of so many rows begins, which has what is left, too."""
+    return max((count - rows // 2 - 1) // rows, 0) * rows
 
 
 def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
@@ -136,10 +157,14 @@ def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
 
 def one_sided(values: Array, interval: float) -> OneSided | None:
     """Spikes of a channel (N,) to one side that are errors, or may be; None where chance, a base or a counter makes them."""
-    step, _ = lattice(values)
+    sizes = sizes_of(values, interval)
     for far in (NEAR, FAR):
-        at, said = spikes_of(values, interval, far)
-        alone = np.abs(values[at] - said) > far * step
+        at, said = spikes_of(values, interval, far, sizes)
+        if len(at) < FEWEST:
+            continue
+        alone = np.abs(values[at] - said)
+        bound = largest_step(values)
+        alone = alone > far * (bound if far * bound < alone.min() else lattice(values)[0])
         at, said = at[alone], said[alone]
         size = values[at] - said
         total = float(size.sum())
