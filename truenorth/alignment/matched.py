@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
 from truenorth.core.compiled import borrowing, compiled
-from truenorth.core.linalg import copy_corner, four_rows_within, transpose_block
-from truenorth.core.vectors import load8, plus8, store8, times8
+from truenorth.core.linalg import copy_corner, four_rows_within, mirror_upper, transpose_block
+from truenorth.core.vectors import load8, store8
 from truenorth.errors.staying import STARTS
-from truenorth.filters.gains import Gains, row_times, through
+from truenorth.filters.gains import Gains, through
 
 Array = NDArray[np.float64]
 
@@ -277,56 +277,60 @@ def _sum_back(
 ) -> None:
     """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last misalignment of it.
 
-    The quadratic form comes first, the linear ones of the innovations are columns behind it. Between two of `behind` what
-    ``(e_k, w)`` makes is followed forwards; what stands behind the later one is a form of ``M (e_k, w)``. Rows have zeros at
-    their ends.
+    The quadratic form comes first, the linear ones of the innovations are columns behind it. Rows have zeros at their ends.
     """
-    n, used, right = step.shape[1], forms.shape[1], seen.shape[2]
+    misalignment = STARTS[0]
+    n, m, used, right = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
     N, rows, wide = 4 * ((n + 3) // 4), 4 * ((used + 3) // 4), 8 * ((used + right + 7) // 8)
     form, end = np.zeros((rows, wide)), np.zeros((4, wide))
     for i in range(3):
-        end[i, STARTS[0] + i] = 1.0
+        end[i, misalignment + i] = 1.0
     form_before, end_before, T = np.zeros_like(form), np.zeros_like(end), np.zeros_like(form)
-    course, e, whole, above_t = np.zeros((N, wide)), np.zeros((N, wide)), np.zeros((N, N)), np.zeros((rows, N))
+    # e goes on as F (e, w), and is seen, made white, as G (e, w); behind G stand the innovations.
+    whole, course = np.zeros((N, N)), np.zeros((N, wide))
     for i in range(n):
+        course[i, i] = 1.0
         for j in range(U.shape[1]):
             course[i, n + j] = U[i, j]
-    F, G = np.zeros((N, wide)), np.zeros((gain.shape[2], wide))
-    stop = step.shape[0]
-    for row in range(len(behind) - 1, -1, -1):
-        for i in range(N):
-            for j in range(wide):
-                F[i, j] = 1.0 if i == j and i < n else 0.0
-        for i in range(rows):
-            for j in range(wide):
-                form_before[i, j] = 0.0
-        for k in range(behind[row] + 1, stop):
-            for i in range(n):
-                for j in range(0, wide, 8):
-                    store8(e, (i, j), plus8(load8(F, (i, j)), load8(course, (i, j))))
-            copy_corner(step[k], whole, n, n)
-            _go_on(whole, H_Phi[k], gain[k], A[k], e, F, G)
-            _whiten(L[k], used, seen[k], G)
-            _add_squares(used, G, form_before)
-        # M' form M of what stands behind, with M = [F; 0 I].
+    F, G = np.zeros((N, wide)), np.zeros((m, wide))
+    above_t, below = np.zeros((rows, N + m)), np.zeros((n + m, wide))
+    row = len(behind) - 1
+    for k in range(step.shape[0] - 1, -1, -1):
+        while row >= 0 and behind[row] == k:
+            _keep(form, forms[row])
+            _keep(end, ends[row])
+            row -= 1
+        if row < 0:
+            break
+        copy_corner(step[k], whole, n, n)
+        _go_on(whole, H_Phi[k], gain[k], A[k], course, F, G)
+        _whiten(L[k], used, G)
+        for i in range(m):
+            for j in range(right):
+                G[i, used + j] = seen[k, i, j]
         _times_course(n, form, F, T)
+        # [F; G]' [T; G], and T itself of the courses: M' form M + G' G.
         for i in range(0, rows, 4):
             for j in range(0, N, 4):
                 transpose_block(F, j, i, above_t)
+        for i in range(m):
+            for j in range(used):
+                above_t[j, n + i] = G[i, j]
+        for i in range(n + m):
+            for j in range(wide):
+                below[i, j] = T[i, j] if i < n else G[i - n, j]
         for i in range(0, rows, 4):  # what stands before the diagonal is what stands behind it
-            four_rows_within(n, above_t, T, form_before, i, 8 * (i // 8), wide, form_before)
+            four_rows_within(n + m, above_t, below, None, i, i, wide, form_before)
         for i in range(n, rows):
             for j in range(wide):
                 form_before[i, j] += T[i, j]
-        for i in range(used):
+        mirror_upper(4 * (used // 4), form_before)
+        for i in range(4 * (used // 4), used):
             for j in range(i):
                 form_before[i, j] = form_before[j, i]
         form, form_before = form_before, form
         _times_course(n, end, F, end_before)
         end, end_before = end_before, end
-        _keep(form, forms[row])
-        _keep(end, ends[row])
-        stop = behind[row] + 1
 
 
 @compiled
@@ -338,43 +342,38 @@ def _keep(values: Any, place: Any) -> None:
 
 
 @borrowing(forceinline=True)
-def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, e: Any, F: Any, G: Any) -> None:
-    """``F = step e - gain [0, A]`` and ``G = H Phi e + [0, A]``."""
+def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, course: Any, F: Any, G: Any) -> None:
+    """``F = step [I, U] - gain [0, A]`` and ``G = H Phi [I, U] + [0, A]``, with ``course = [I, U]``."""
     n, m = gain.shape[0], gain.shape[1]
+    known = 8 * (n // 8)  # columns of the step itself
     for i in range(0, len(step), 4):
-        four_rows_within(n, step, e, None, i, 0, F.shape[1], F)
+        four_rows_within(n, step, course, None, i, known, F.shape[1], F)
+    for i in range(n):
+        for j in range(0, known, 8):
+            store8(F, (i, j), load8(step, (i, j)))
     for i in range(n):
         for r in range(m):
             for j in range(A.shape[1]):
                 F[i, n + j] -= gain[i, r] * A[r, j]
     for i in range(m):
-        row_times(H_Phi, i, n, e, G)
+        for j in range(G.shape[1]):
+            G[i, j] = 0.0
+        for r in range(n):
+            for j in range(G.shape[1]):
+                G[i, j] += H_Phi[i, r] * course[r, j]
         for j in range(A.shape[1]):
             G[i, n + j] += A[i, j]
 
 
 @borrowing(forceinline=True)
-def _whiten(L: Any, used: int, seen: Any, G: Any) -> None:
-    """``G = L^-1 G`` of the columns used, L lower triangular; behind them stand the innovations, which are white."""
+def _whiten(L: Any, used: int, G: Any) -> None:
+    """``G = L^-1 G`` of the columns used, L lower triangular."""
     for i in range(G.shape[0]):
         for r in range(i):
             for j in range(used):
                 G[i, j] -= L[i, r] * G[r, j]
         for j in range(used):
             G[i, j] /= L[i, i]
-        for j in range(seen.shape[1]):
-            G[i, used + j] = seen[i, j]
-
-
-@borrowing(forceinline=True)
-def _add_squares(used: int, G: Any, form: Any) -> None:
-    """``form += G' G`` on and behind the diagonal."""
-    for i in range(used):
-        for j in range(8 * (i // 8), form.shape[1], 8):
-            total = load8(form, (i, j))
-            for r in range(G.shape[0]):
-                total = plus8(total, times8(G[r, i], load8(G, (r, j))))
-            store8(form, (i, j), total)
 
 
 @borrowing(forceinline=True)
