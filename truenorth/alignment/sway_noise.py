@@ -6,10 +6,6 @@ without these. Velocity that wanders as ``t^(1/2)`` and ``g t^(3/2)`` is no moti
 
 So does a bias that changes: what it explains, by the quiet sensors' filter, is no sign of noise.
 
-The level axes alone are asked. The vertical has one oscillator, and a sea often heaves in two tones: a walk is likelier than what
-one oscillator leaves. On an indexer of a moored ship squares of innovations along the vertical were 2.4 times their size, and
-accelerometers four times as noisy were likelier by 349 (twice the logarithm); by the level axes alone they were less likely by 65.
-
 White noise is as dense above the sway as under it. Where a sensor looks white there, and is as quiet as specified, what is slow and
 louder is a motion that the fit has missed: a ship at her moorings goes to and fro in many tones.
 """
@@ -72,17 +68,14 @@ def noisier_sensors(
         AxisMotion(QUIETEST_BASE, tuple(item for item in axis.oscillators if not is_slow(item, duration)))
         for axis in motion
     ]
-    if all(axis == other for axis, other in zip(motion[:2], steady[:2], strict=True)):
+    if all(axis == other for axis, other in zip(motion, steady, strict=True)):
         return {}  # no motion that noise could hide in
 
     def likelihood(sensor: str, factor: float) -> float:
-        """Twice its logarithm along the level axes, of the better of both motions."""
+        """Twice its logarithm, of the better of both motions."""
         other = copy.copy(log)
         other.noise = louder_walks(log.noise, {sensor: factor})
         system = other.linearise()
-        level = system.z.copy()
-        level[:, 2] = np.nan  # an absent row
-        system = system.with_arrays(z=level)
         both = (motion,) if factor == 1.0 else (motion, steady)
         systems = (with_motion(system, interval, m, spare=False) for m in both)
         return max(2.0 * float(kalman(item).log_likelihood) for item in systems)
