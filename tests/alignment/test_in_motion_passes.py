@@ -25,6 +25,7 @@ from truenorth.state.track import Track
 
 POOR = {
     "name": "constant biases",
+    "unnamed": "zero",
     "gyro": {"bias": "100 deg/h", "random_walk": "0.3 deg/sqrt(h)"},
     "accel": {"bias": "8 mg", "random_walk": "100 ug/sqrt(Hz)"},
 }
