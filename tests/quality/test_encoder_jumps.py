@@ -34,7 +34,7 @@ def test_a_jump_is_found_where_it_is(rows, runs):
         x = counted(sway(rng, time), rng.uniform(0.05, 0.3, 2), time, ARCSEC)
         axis, row, size = rng.integers(2), int(rng.uniform(0.1, 0.9) * len(time)), np.radians(rng.uniform(0.03, 5.0))
         x[row:, axis] += size
-        (found,) = jump_evidence(time, x)
+        (found,) = jump_evidence(time, np.zeros_like(x), x)
         assert found.figures["axis"] == str(axis + 1)
         assert found.figures["size"] == pytest.approx(size, rel=0.1)
         assert abs(found.figures["time"] - time[row]) < 3.0 / rows
@@ -48,7 +48,7 @@ def test_the_steps_of_a_resolution_are_no_jumps(step, runs):
         rng = np.random.default_rng([run, 8])
         time = np.arange(0.0, 240.0, 0.02)
         x = counted(sway(rng, time), rng.uniform(0.03, 0.3, 2), time, step * ARCSEC)
-        assert jump_evidence(time, x) == []
+        assert jump_evidence(time, np.zeros_like(x), x) == []
 
 
 def test_a_row_that_was_misread_comes_back():
@@ -56,12 +56,37 @@ def test_a_row_that_was_misread_comes_back():
     x = counted(sway(np.random.default_rng(3), time), np.array([0.2, 0.1]), time, ARCSEC)
     x[4000, 1] += 0.3
     x[7000:7003, 0] -= 0.1
-    assert jump_evidence(time, x) == []
+    assert jump_evidence(time, np.zeros_like(x), x) == []
+
+
+@pytest.mark.parametrize("late", [0.001, 0.02])
+def test_an_encoder_that_is_late_jumps_where_its_axis_starts_and_stops(late):
+    """From rest to 10 deg/s within a row, and back: it is no slip. One at rest is, and one as the axis turns."""
+    time = np.arange(0.0, 240.0, 0.02)
+    goes = (time % 40.0 > 30.0).astype(float)
+    own = np.radians(10.0) * 0.02 * np.cumsum(goes)[:, None] * np.array([1.0, 0.0])
+    seen = np.interp(time - late, time, own[:, 0])
+    x = counted(sway(np.random.default_rng(5), time), np.zeros(2), time, ARCSEC)
+    x[:, 0] += seen - own[:, 0]
+    assert jump_evidence(time, own, x) == []
+    for row in (5000, 5750):  # at rest, and as it turns
+        slipped = x.copy()
+        slipped[row:, 0] += np.radians(0.3)
+        (found,) = jump_evidence(time, own, slipped)
+        assert found.figures["size"] == pytest.approx(np.radians(0.3), rel=0.1)
+
+
+def test_rows_that_are_lost_are_no_jump():
+    time = np.arange(0.0, 240.0, 0.02)
+    x = counted(sway(np.random.default_rng(6), time), np.array([0.2, 0.1]), time, ARCSEC)
+    there = np.ones(len(time), dtype=bool)
+    there[3000:3040] = there[8000:8003] = there[9000] = False
+    assert jump_evidence(time[there], np.zeros_like(x[there]), x[there]) == []
 
 
 def test_a_short_log_shows_nothing():
-    assert jump_evidence(np.arange(10.0), np.zeros((10, 2))) == []
-    assert jump_evidence(np.arange(100.0), np.zeros((100, 2))) == []
+    assert jump_evidence(np.arange(10.0), np.zeros((10, 2)), np.zeros((10, 2))) == []
+    assert jump_evidence(np.arange(100.0), np.zeros((100, 2)), np.zeros((100, 2))) == []
 
 
 @few_and_all(6, few=1)

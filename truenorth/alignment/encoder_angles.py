@@ -25,7 +25,7 @@ COVER = 0.05  # s by which an encoder's log may begin late or end early
 ROUNDING = 1e-3  # of a row, by which stamps of one moment differ: beyond the edges the gyros say nothing
 FEWEST = 4  # rows that a spline needs
 MOST_DIFFERENCES = 8
-NONE = (np.empty(0), np.empty((0, 0)))
+NONE = (np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
 PASSES = 2  # the direction of an outer axis in the IMU is known by straight lines at first
 
 
@@ -47,8 +47,8 @@ class CarriedAngles:
         White noise of the encoder's rows, steps of its resolution included while it turns.
     time : (N,) array, s
         Of the encoder's rows.
-    turned : (N, A) array, rad
-        By which the angles there turn more than the gyros about the axes: the turn of the body.
+    by_gyros, turned : (N, A) arrays, rad
+        There by how much the gyros turn about the axes, and the angles more than these: the turn of the body.
     """
 
     record: EncoderRecord
@@ -57,6 +57,7 @@ class CarriedAngles:
     swing: float
     noise: float
     time: Array
+    by_gyros: Array
     turned: Array
 
     def sigma(self, time: float) -> float:
@@ -115,7 +116,7 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     swing = float(np.sqrt(np.max(np.mean(of_body(time, 2) ** 2, axis=0))))
     noise, step = _white(own), float(np.median(np.diff(time)))
     carried = replace(encoder, time=edges, angles=_shaped(angles))
-    return CarriedAngles(carried, float(time[-1]), step, swing, noise, time, own)
+    return CarriedAngles(carried, float(time[-1]), step, swing, noise, time, at_rows, own)
 
 
 def _white(y: Array) -> float:

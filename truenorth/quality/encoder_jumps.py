@@ -1,7 +1,8 @@
 """An encoder that slips: from one row to the next an angle jumps, and the gyros of the IMU on the axis see no turn.
 
 What the encoder turns more than the gyros about its axes is the turn of the base, which is smooth: differences of a high order
-leave noise of it. A jump stands out there by its own pattern.
+leave noise of it. A jump stands out there by its own pattern. Where the axis starts or stops, an encoder that is a little late
+makes one as well, and takes it back later.
 """
 
 from __future__ import annotations
@@ -21,28 +22,38 @@ Array = NDArray[np.float64]
 ORDERS = range(2, 9)  # of differences: each leaves less of the base's motion, and more noise
 LEAST = 4  # a cubic goes on across the rows of a jump
 FEWEST = 50  # rows that show what their noise is
+GAP = 1.5  # steps of its rows
+LATE = 0.05  # s: an encoder that is late by less looks so where its axis starts or stops
+NEAR = 10  # rows about a jump in which that may be
 SELDOM = 0.02  # of the rows: what is more frequent is noise
 BEYOND = 2.326  # sigmas, that a normal variable exceeds as seldom
 
 
-def jump_evidence(time: Array, turned: Array) -> list[Evidence]:
+def jump_evidence(time: Array, by_gyros: Array, turned: Array) -> list[Evidence]:
     """Jumps of an encoder's angles.
 
     Parameters
     ----------
     time : (N,) array, s
         Of the encoder's rows.
-    turned : (N, A) array, rad
-        By which each angle turns more than the gyros about its axis.
+    by_gyros, turned : (N, A) arrays, rad
+        By which the gyros turn about each axis, and its angle more than these.
     """
     if len(time) < FEWEST:
         return []
+    step = float(np.median(np.diff(time)))
+    cuts = [0, *(np.flatnonzero(np.diff(time) > GAP * step) + 1), len(time)]
     found = []
-    for axis, x in enumerate(turned.T):
-        for first, size in _jumps(x):
-            figures: dict[str, Figure] = {"axis": str(axis + 1), "size": size, "time": float(time[first])}
-            kind: Kind = "bounded" if abs(size) > USUAL_ZERO else "known"
-            found.append(Evidence("encoder.jumps", figures, kind, Effect(abs(size), abs(size)), ("encoder",)))
+    for part in (slice(a, b) for a, b in pairwise(cuts) if b - a >= FEWEST):  # across a gap the base goes on unseen
+        for axis, (x, own) in enumerate(zip(turned[part].T, by_gyros[part].T, strict=True)):
+            rate = np.diff(own, append=own[-1]) / step
+            for row, size in _jumps(x):
+                near = rate[max(row - NEAR, 0) : row + NEAR]
+                if abs(size) < LATE * float(np.ptp(near)):
+                    continue
+                figures: dict[str, Figure] = {"axis": str(axis + 1), "size": size, "time": float(time[part][row])}
+                kind: Kind = "bounded" if abs(size) > USUAL_ZERO else "known"
+                found.append(Evidence("encoder.jumps", figures, kind, Effect(abs(size), abs(size)), ("encoder",)))
     return found
 
 
