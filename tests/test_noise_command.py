@@ -45,6 +45,18 @@ def test_white_noise_comes_back_and_stands_in_both_files(still, tmp_path, capsys
     assert (tmp_path / "noise" / "noise.svg").stat().st_size > 1000
 
 
+def test_what_rest_does_not_show_is_not_zero(still, tmp_path, capsys):
+    """The file of an IMU's noise names no bias: with zeros in it a log of the same IMU was inconsistent."""
+    code, _ = run(capsys, "noise", still, "-o", tmp_path / "noise")
+    assert code == 0
+    for name in ("imu.yaml", "kalibr.yaml"):
+        assert {"gyro_bias", "accel_bias", "gyro_scale_factor"} <= set(imu_spec(tmp_path / "noise" / name).unsaid)
+    assert "unnamed" not in (tmp_path / "noise" / "imu.yaml").read_text()
+    assert imu_spec(tmp_path / "noise" / "imu.yaml").gyro_random_walk == pytest.approx(ARW, rel=0.1)
+    code, _ = run(capsys, "noise", still, "--like", "tactical", "-o", tmp_path / "like")
+    assert imu_spec(tmp_path / "like" / "imu.yaml").unsaid == ()
+
+
 @pytest.mark.parametrize("sway", [0.02, 0.5])  # deg, of a ship at the quay
 def test_motion_is_not_the_sensors_noise(sway, tmp_path):
     from truenorth.core.errors import AlignmentError

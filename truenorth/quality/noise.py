@@ -30,6 +30,7 @@ from truenorth.analysis.allan import (
 )
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
+from truenorth.records.spec_keys import ENTRIES, field_of, unnamed
 from truenorth.records.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
@@ -138,7 +139,7 @@ def noise_from_log(
     terms: dict[str, Any] = {
         f"{group}_{key}": float(a[i].max()) for key, a in worst.items() for i, group in enumerate(("gyro", "accel"))
     }
-    base = ImuSpec() if like is None else imu_spec(like)
+    base = ImuSpec(unsaid=unnamed(terms)) if like is None else imu_spec(like)
     seen = bool(instability.any())
     spec = replace(base, **terms, correlation_time=tries[best] if seen else base.correlation_time, name=name)
     return LogNoise(
@@ -168,7 +169,9 @@ def with_terms_seen(spec: ImuSpec, gyro: NoiseCoefficients, accel: NoiseCoeffici
         if seen.rate_random_walk.any():
             terms[f"{group}_rate_random_walk"] = float(drive * getattr(spec, f"{group}_bias_instability"))
         terms[f"{group}_bias_instability"] = 0.0
-    return replace(spec, **terms)
+    found = replace(spec, **terms)
+    silent = unnamed(name for key in ENTRIES if getattr(found, name := field_of(*key)))
+    return replace(found, unsaid=silent) if spec.unsaid else found  # what rest does not show is not zero
 
 
 def _correlation_times(record: ImuRecord) -> list[float]:
