@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
-from truenorth import imu_spec
+from truenorth import align, imu_spec
+from truenorth.advice.positions import advise
 from truenorth.alignment.unsaid import as_usual, completed
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.errors import DataError
@@ -141,3 +144,53 @@ def test_files_come_back_as_they_were(tmp_path):
 def test_another_word_is_refused():
     with pytest.raises(DataError, match="unnamed: 'none'; expected usual or zero"):
         imu_spec(NOISE | {"unnamed": "none"})
+
+
+def test_noise_of_samples_is_noise():
+    """Consumer gyros by their sample noise were completed as of navigation grade: .8 deg/h of bias, 5 ppm of scale factor."""
+    spec = imu_spec({"gyro": {"sample_noise": "0.1 deg/s"}, "accel": {"sample_noise": "0.02 m/s^2"}})
+    whole = as_usual(spec)
+    assert whole.gyro_scale_factor > imu_spec("industrial").gyro_scale_factor
+    assert as_usual(imu_spec({"gyro": {"bias": "0 deg/h"}})).gyro_scale_factor == pytest.approx(
+        imu_spec("consumer").gyro_scale_factor
+    )
+
+
+def test_what_has_been_put_in_since_counts():
+    """By `replace`: thrown away on a base that stays, and said to be missing."""
+    inputs, _ = BENCHES["still"].draw(78, 0)
+    navigation = imu_spec("navigation")
+    whole = replace(imu_spec(NOISE), **{f.name: getattr(navigation, f.name) for f in fields(navigation) if f.compare})
+    assert whole.still_unsaid == ()
+    answer = BENCHES["still"].align(inputs | {"imu": whole})
+    assert answer.imu_source == "specification 'navigation'"
+    assert not any(item.key.startswith("specification.") for item in answer.evidence)
+    turned_on = replace(imu_spec(NOISE), gyro_turn_on_bias=1e-6)
+    assert as_usual(turned_on).gyro_bias == 0.0
+    assert as_usual(as_usual(turned_on)) == as_usual(turned_on)
+
+
+def test_a_method_of_ones_own_gets_a_specification():
+    inputs, _ = BENCHES["still"].draw(78, 0)
+    asked = []
+
+    def mine(request):
+        asked.append(request.imu)
+        return align(request.record, request.place, request.imu)
+
+    align(inputs["record"], inputs["place"], NOISE, method=mine)
+    assert asked[0].gyro_random_walk > 0.0
+    assert asked[0].gyro_bias > 0.0
+
+
+def test_advice_takes_no_bias_for_zero():
+    noise = noise_of(imu_spec("navigation"))
+    (one,) = advise(noise, (40.0, 0.0), np.radians(0.05), schemes={"one position": ()}).schemes
+    assert one.reached is None
+
+
+def test_the_limit_of_a_heading_moves_no_answer():
+    """Of a still log of which nothing is said a heading known to .1 deg was left out where less was wanted."""
+    inputs, _ = BENCHES["still"].draw(78, 0)
+    found = [align(inputs["record"], inputs["place"], heading_limit=np.radians(limit)) for limit in (0.05, 5.0)]
+    assert np.array_equal(found[0].C_nb, found[1].C_nb)

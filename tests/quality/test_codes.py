@@ -72,3 +72,9 @@ def test_counts_that_were_added_up_and_taken_apart_miss_none(seed):
     angle = count * np.round(np.cumsum(rate))
     dtheta = np.diff(angle, prepend=0.0)
     assert piled_up(dtheta) is None
+
+
+def test_a_short_channel_has_no_pile():
+    """Of 10 to 13 rows two slices of another length were compared."""
+    for rows in range(1, 20):
+        assert piled_up(np.arange(rows) % 3.0) is None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, model_from_spec
 from truenorth.alignment.transfer_system import system_of_motion
+from truenorth.alignment.unsaid import as_usual
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.shown import Shown
@@ -159,7 +160,7 @@ def advise_manoeuvre(
     for name, value in (("speed", speed), ("wanted", wanted), ("longest", longest), ("rate", rate)):
         if not 0.0 < value < math.inf:
             raise UsageError(f"{name} is {value}; expected a positive number")
-    spec, flights = imu_spec(imu), standard_manoeuvres(Position.of(position), speed)
+    spec, flights = as_usual(imu_spec(imu)), standard_manoeuvres(Position.of(position), speed)
     unknown = [name for name in manoeuvres if name not in flights]
     if unknown:
         raise UsageError(f"manoeuvre {unknown[0]!r} is not known; choose of {', '.join(flights)}")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from truenorth.advice.better import Better, better
 from truenorth.alignment.positions import ARM_SIGMA, SHORTEST_POSITION, prior_covariance
+from truenorth.alignment.unsaid import as_usual
 from truenorth.analysis.error_budget import Source, error_budget
 from truenorth.core.earth import DEFLECTION
 from truenorth.core.errors import UsageError
@@ -225,7 +226,7 @@ def advise(
             raise UsageError(f"advise: {name} is {shown}; expected a number above {least:g}")
     if not schemes:
         raise UsageError("advise: no schemes; expected one at least, such as {'two positions': (180,)}")
-    spec, position = imu_spec(imu).with_random_walks(1.0 / rate), Position.of(position)
+    spec, position = as_usual(imu_spec(imu)).with_random_walks(1.0 / rate), Position.of(position)
     found = []
     for name, turns in schemes.items():
         time = np.geomspace(SHORTEST, longest, TIMES)

@@ -214,12 +214,13 @@ def is_lost(task: Task, check: LogCheck, spec: ImuSpec | None, heading_limit: fl
     if task.motion.overall != "still" or task.motion.fraction("rotating") > 0.0:
         return False
     north = EARTH_RATE * math.cos(task.position.lat)
-    if float(np.max(check.rate_noise)) > north * math.sin(LOST_HEADING):
+    lost = north * math.sin(LOST_HEADING)
+    if float(np.max(check.rate_noise)) > lost:
+        return True
+    if inferred and spec is not None and math.sqrt(float(spec.bias_variance[0])) > lost:
         return True
     if spec is None or math.sqrt(float(spec.bias_variance[0])) < north * math.sin(min(heading_limit, 0.5 * math.pi)):
         return False
-    if inferred:
-        return True
     walks, T = Walks.of(spec), task.record.duration
     tilt = walks.gyro_rate_walk * math.sqrt(T**3 / 3.0)
     return task.gravity * 0.5 * tilt**2 > walks.accel_random_walk / math.sqrt(T)

@@ -253,6 +253,9 @@ RECIPES = [
 ]
 
 
+LIBRARY = tuple(RECIPES)  # those that infer what is not said of an IMU from its log
+
+
 def register_recipe(recipe: Recipe) -> None:
     """Register a recipe; among those that fit the same aids the last one registered is taken."""
     RECIPES.insert(0, recipe)
@@ -327,7 +330,8 @@ def align(
     if imu is not None and (said := imu_spec(imu)).unsaid:
         from truenorth.alignment.unsaid import completed
 
-        imu, unsaid = completed(said, log, stays=aids.keys() <= {Indexer, Positions})
+        own = callable(method) or method in plugins("truenorth.methods") or _fitting(set(aids)) not in LIBRARY
+        imu, unsaid = completed(said, log, stays=not own and aids.keys() <= {Indexer, Positions})
     request = Request(
         log,
         None if place is None else Position.of(place),
@@ -372,8 +376,12 @@ def _no_option(name: str, of: str) -> UsageError:
     return UsageError(f"{name!r} is no option of an alignment of {of}")
 
 
+def _fitting(kinds: set[type]) -> Recipe | None:
+    return next((recipe for recipe in RECIPES if recipe.fits(kinds)), None)
+
+
 def _recipe(kinds: set[type]) -> Recipe:
-    found = next((recipe for recipe in RECIPES if recipe.fits(kinds)), None)
+    found = _fitting(kinds)
     if found is None:
         sets = "; ".join(f"{' and/or '.join(k.__name__ for k in r.aids)} ({r.name})" for r in RECIPES if r.aids)
         names = ", ".join(sorted(kind.__name__ for kind in kinds))

@@ -36,6 +36,7 @@ TILTED = 1.0  # rad: by which a vehicle has turned about a level axis at the end
 LEANING = (
     0.1  # of the rate about the vertical, that a vehicle which leans or climbs sees about its level axes in the mean
 )
+USUAL_INTERVAL = 0.01  # s between samples, where their noise is given and no log
 NOTHING = np.empty(0)
 
 
@@ -51,14 +52,14 @@ def completed(spec: ImuSpec, record: ImuRecord, *, stays: bool) -> tuple[ImuSpec
         taken, but for one that knows lags or places.
     """
     known = lag(spec, "gyro") > 0.0 or lag(spec, "accel") > 0.0 or spec.accel_positions is not None
-    if stays and "gyro_bias" in spec.unsaid and not known:
+    if stays and "gyro_bias" in spec.still_unsaid and not known:
         return None, (note("specification.noise_alone", "specification", imu=spec.name),)
     found = as_usual(spec, record)
     return found, unsaid_evidence(found)
 
 
 def as_usual(spec: ImuSpec, record: ImuRecord | None = None) -> ImuSpec:
-    """The specification with what it does not name as large as it may be.
+    """The specification with what it does not name as large as it may be; its `unsaid` is what was put in so.
 
     Parameters
     ----------
@@ -66,12 +67,14 @@ def as_usual(spec: ImuSpec, record: ImuRecord | None = None) -> ImuSpec:
     record : ImuRecord, optional
         Whose mean rate about level axes bounds the gyros' biases.
     """
+    if not spec.unsaid:
+        return spec
+    seen = spec.with_random_walks(USUAL_INTERVAL if record is None else record.interval)
     found: dict[str, Any] = {}
-    for name in spec.unsaid:
+    for name in spec.still_unsaid:
         sensor, _, what = name.partition("_")
-        if getattr(spec, name) == 0.0:  # nobody has put it right since
-            found[name] = _usual(spec, sensor, what, record)
-    return replace(spec, **found) if found else spec
+        found[name] = _usual(seen, sensor, what, record)
+    return replace(spec, **found, unsaid=tuple(found))
 
 
 def _usual(spec: ImuSpec, sensor: str, what: str, record: ImuRecord | None) -> float:
@@ -123,7 +126,13 @@ def _walk(spec: ImuSpec, sensor: str) -> float:
     presets = [imu_spec(name) for name in PRESETS]
     walks = [getattr(preset, f"{sensor}_random_walk") for preset in presets]
     for alike in (f"{sensor}_bias", f"{other}_random_walk", f"{other}_bias"):
-        if own == 0.0 and (value := float(getattr(spec, alike))) > 0.0:
+        if own == 0.0 and (value := _said(spec, alike)) > 0.0:
             sizes = np.log([getattr(preset, alike) for preset in presets])
             own = math.exp(float(np.interp(math.log(value), sizes, np.log(walks))))
-    return own or walks[0]
+    return own or walks[-1]  # of an IMU of which nothing is said the poorest
+
+
+def _said(spec: ImuSpec, name: str) -> float:
+    """What a specification says of a term, of a bias the part of each switch-on as well."""
+    value = float(getattr(spec, name))
+    return math.hypot(value, float(getattr(spec, name.replace("bias", "turn_on_bias")))) if "bias" in name else value

@@ -42,7 +42,7 @@ class Pile(NamedTuple):
 def piled_up(values: Array) -> Pile | None:
     """The value of a channel (N,) that has the rows of the largest hole; None where there is no such hole."""
     least, ordered = math.ceil(PART * LEAST), np.sort(values)
-    if not np.any(ordered[least - 1 :] == ordered[: len(ordered) - least + 1]):
+    if len(values) < least or not np.any(ordered[least - 1 :] == ordered[: len(ordered) - least + 1]):
         return None  # no value has so many rows
     levels, counts = np.unique(ordered, return_counts=True)
     if len(levels) < 2 * LEVELS + 1:

@@ -30,7 +30,7 @@ from truenorth.analysis.allan import (
 )
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
-from truenorth.records.spec_keys import ENTRIES, field_of, unnamed
+from truenorth.records.spec_keys import unnamed
 from truenorth.records.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
@@ -170,8 +170,8 @@ def with_terms_seen(spec: ImuSpec, gyro: NoiseCoefficients, accel: NoiseCoeffici
             terms[f"{group}_rate_random_walk"] = float(drive * getattr(spec, f"{group}_bias_instability"))
         terms[f"{group}_bias_instability"] = 0.0
     found = replace(spec, **terms)
-    silent = unnamed(name for key in ENTRIES if getattr(found, name := field_of(*key)))
-    return replace(found, unsaid=silent) if spec.unsaid else found  # what rest does not show is not zero
+    found = replace(found, unsaid=unnamed(())) if spec.unsaid else found
+    return replace(found, unsaid=found.still_unsaid)  # what rest does not show is not zero
 
 
 def _correlation_times(record: ImuRecord) -> list[float]:

@@ -91,7 +91,8 @@ class ImuSpec:
         Of the bias instabilities.
     name : str
     unsaid : tuple of str
-        Fields that a file or a mapping does not name; empty where the specification is made of numbers.
+        Fields that a file or a mapping does not name; empty where the specification is made of numbers. Those that have been put
+        in since are not in `still_unsaid`.
     """
 
     gyro_bias: float = 0.0
@@ -162,6 +163,16 @@ class ImuSpec:
         return np.asarray(found)
 
     @property
+    def still_unsaid(self) -> tuple[str, ...]:
+        """Of `unsaid` what has not been put in since, by itself or by what stands for it."""
+        silent = self._silent()
+        return tuple(name for name in self.unsaid if name in silent)
+
+    def _silent(self) -> tuple[str, ...]:
+        """Terms that no IMU is without, and that are zero here."""
+        return unnamed(name for key in ENTRIES if getattr(self, name := field_of(*key)))
+
+    @property
     def constant_variance(self) -> NDArray[np.float64]:
         """(6,) of it what does not change within a log: all but the bias instabilities."""
         gyro = self.gyro_bias**2 + self.gyro_turn_on_bias**2
@@ -209,7 +220,7 @@ class ImuSpec:
     def to_mapping(self) -> dict[str, Any]:
         """The specification as it stands in a file; only what differs from a perfect IMU."""
         result: dict[str, Any] = {"name": self.name}
-        silent = unnamed(name for key in ENTRIES if getattr(self, name := field_of(*key)))  # in a file without zeros
+        silent = self._silent()  # in a file without zeros
         if silent and not self.unsaid:
             result["unnamed"] = "zero"
         for (group, key), entry in ENTRIES.items():
