@@ -81,7 +81,25 @@ def test_rows_that_are_lost_are_no_jump():
     x = counted(sway(np.random.default_rng(6), time), np.array([0.2, 0.1]), time, ARCSEC)
     there = np.ones(len(time), dtype=bool)
     there[3000:3040] = there[8000:8003] = there[9000] = False
+    there &= np.random.default_rng(7).random(len(time)) > 0.03
     assert jump_evidence(time[there], np.zeros_like(x[there]), x[there]) == []
+    for row in (5000, 9000):  # one of them lost
+        slipped = x.copy()
+        slipped[row:, 1] += np.radians(0.1)
+        (found,) = jump_evidence(time[there], np.zeros_like(x[there]), slipped[there])
+        assert found.figures["size"] == pytest.approx(np.radians(0.1), rel=0.1)
+
+
+@pytest.mark.parametrize("step", [2.6, 158.0, 1260.0])  # arcsec: of 19, 13 and 10 bits
+def test_an_axis_that_seldom_turns_counts_and_does_not_slip(step):
+    """A turn of 90 deg in 600 s is less than two rows in a hundred: each count of it was a jump, and the turn one of 87 deg."""
+    time = np.arange(0.0, 1800.0, 0.02)
+    rate = np.radians(10.0) * np.clip(5.5 - np.abs(time % 600.0 - 300.0), 0.0, 1.0)
+    own = np.cumsum(rate)[:, None] * 0.02
+    x = step * ARCSEC * np.round((sway(np.random.default_rng(9), time)[:, :1] * 0.01 + own) / (step * ARCSEC)) - own
+    rests = rate == 0.0
+    x[rests, 0] = np.round(own[rests, 0] / (step * ARCSEC)) * step * ARCSEC - own[rests, 0]  # the base at rest, too
+    assert jump_evidence(time, own, x) == []
 
 
 def test_a_short_log_shows_nothing():

@@ -18,11 +18,15 @@ from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 ORDERS = range(2, 9)  # of differences: each leaves less of the base's motion, and more noise
 LEAST = 4  # a cubic goes on across the rows of a jump
 FEWEST = 50  # rows that show what their noise is
 GAP = 1.5  # steps of its rows
+BRIDGED = 0.2  # s: in less a base that sways goes on as it did
+TURNS = 0.05  # of its largest rate: an axis that turns counts the steps of its resolution, one at rest none
+LONGEST = 4  # times the rows that a step is fitted to: what lasts for longer is no jump
 LATE = 0.05  # s: an encoder that is late by less looks so where its axis starts or stops
 NEAR = 10  # rows about a jump in which that may be
 SELDOM = 0.02  # of the rows: what is more frequent is noise
@@ -42,34 +46,50 @@ def jump_evidence(time: Array, by_gyros: Array, turned: Array) -> list[Evidence]
     if len(time) < FEWEST:
         return []
     step = float(np.median(np.diff(time)))
-    cuts = [0, *(np.flatnonzero(np.diff(time) > GAP * step) + 1), len(time)]
+    cuts = [0, *(np.flatnonzero(np.diff(time) > max(BRIDGED, GAP * step)) + 1), len(time)]
     found = []
     for part in (slice(a, b) for a, b in pairwise(cuts) if b - a >= FEWEST):  # across a gap the base goes on unseen
-        for axis, (x, own) in enumerate(zip(turned[part].T, by_gyros[part].T, strict=True)):
-            rate = np.diff(own, append=own[-1]) / step
-            for row, size in _jumps(x):
+        even, own = _evenly(time[part], by_gyros[part], step)
+        _, more = _evenly(time[part], turned[part], step)
+        for axis in range(turned.shape[1]):
+            rate = np.diff(own[:, axis], append=own[-1, axis]) / step
+            for row, size in _jumps(more[:, axis], np.abs(rate) > TURNS * float(np.max(np.abs(rate)))):
                 near = rate[max(row - NEAR, 0) : row + NEAR]
                 if abs(size) < LATE * float(np.ptp(near)):
                     continue
-                figures: dict[str, Figure] = {"axis": str(axis + 1), "size": size, "time": float(time[part][row])}
+                figures: dict[str, Figure] = {"axis": str(axis + 1), "size": size, "time": float(even[row])}
                 kind: Kind = "bounded" if abs(size) > USUAL_ZERO else "known"
                 found.append(Evidence("encoder.jumps", figures, kind, Effect(abs(size), abs(size)), ("encoder",)))
     return found
 
 
-def _jumps(x: Array) -> list[tuple[int, float]]:
-    """Rows from which on an angle is another, and by how much, rad: what comes back within some rows is left out."""
+def _evenly(time: Array, x: Array, step: float) -> tuple[Array, Array]:
+    """Times a step apart and the columns of `x` there: rows that were lost by a spline through those about them."""
+    if float(np.max(np.diff(time))) <= GAP * step:
+        return time, x
+    from scipy.interpolate import CubicSpline
+
+    even = np.arange(time[0], time[-1] + 0.5 * step, step)
+    return even, np.asarray(CubicSpline(time, x)(np.minimum(even, time[-1])))
+
+
+def _jumps(x: Array, turns: Mask) -> list[tuple[int, float]]:
+    """Rows from which on an angle is another, and by how much, rad: what comes back within some rows is left out.
+
+    `turns`: (N,) whether the axis turns there. Rows in which it does, and those in which it rests, have noise of their own.
+    """
     order = min(ORDERS, key=lambda n: _scale(_steps(x, n)))
     size = _steps(x, order)
-    sigma = _scale(size)
-    rows = np.flatnonzero(np.abs(size) > limit("jump of an encoder") * sigma) if sigma > 0.0 else np.empty(0, int)
+    sigma = np.full(len(x), _scale(size))
+    sigma[turns] = max(sigma[0], _scale(size[turns]) if turns.any() else 0.0)
+    rows = np.flatnonzero((np.abs(size) > limit("jump of an encoder") * sigma) & (sigma > 0.0))
     if not rows.size:
         return []
     cuts = [0, *(np.flatnonzero(np.diff(rows) > order) + 1), rows.size]
     found = []
     for part in (rows[a:b] for a, b in pairwise(cuts)):
         net, its_sigma = _stays(x, int(part[0]), int(part[-1]), order)
-        if abs(net) > limit("jump of an encoder") * max(sigma, its_sigma):
+        if abs(net) > limit("jump of an encoder") * max(float(sigma[part].max()), its_sigma):
             found.append((int(part[np.argmax(np.abs(size[part]))]), net))
     return found
 
@@ -78,6 +98,8 @@ def _stays(x: Array, first: int, last: int, order: int) -> tuple[float, float]:
     """By how much `x` has jumped from before a row to behind another, and its sigma: a step of a polynomial on both sides."""
     order = max(order, LEAST)
     side = order + 2
+    if last - first > LONGEST * side:
+        return 0.0, math.inf
     rows = np.r_[max(first - side, 0) : first, last : min(last + side, len(x))]
     behind = rows >= last
     if behind.all() or not behind.any():
