@@ -219,8 +219,8 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
     if overall == "rotating":
         why += POSITIONS
-    one_way = len(task.motion.regimes) == 1 or rocks_all_along(task.motion)
-    if task.record.duration < SHORTEST_SWAYING or not (overall in words or one_way):
+    # A table that turns an IMU does not rock with it: a motion fitted at the rate of its turn hides what the sensors are off by.
+    if task.record.duration < SHORTEST_SWAYING or not (overall in words or rocks_all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
 

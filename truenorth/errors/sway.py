@@ -37,6 +37,9 @@ MOST_OSCILLATORS = (2, 2, 1)
 AXIS_STATES = (10, 10, 4)
 SMALL = 16  # states of a compiled filter that is there, too, where the motion has few
 
+# Squares of an attitude's nine elements, about its line, of an IMU that goes round: two of a steady turn, .9 of a swing by 60 deg.
+GOES_ROUND = 1.0
+
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half a period: exact to rounding
 
 
@@ -238,6 +241,9 @@ def without_sway(
     factors, a centre of rotation that was found wrongly, and the IMU's size: a filter that believed the signature of the bias would
     claim levels of arcseconds. What is left to show a bias is its mean, and an indexer's modulation.
 
+    An IMU that something turns round and round without saying so has no line to sway about: it is left as it is. The mean attitude
+    of one that spins would leave biases no level part, and level no uncertainty by them.
+
     Parameters
     ----------
     integrals : InertialIntegrals
@@ -250,7 +256,11 @@ def without_sway(
     basis = _line(len(integrals.C_mean))
 
     def slow(C: Array) -> Array:
-        trend = sway_trend(C if turned is None else C @ turned)
+        base = C if turned is None else C @ turned
+        trend = sway_trend(base)
+        about = (basis @ trend).reshape(-1, 3, 3)
+        if np.mean(np.sum((base - about) ** 2, axis=(1, 2))) > GOES_ROUND:
+            return C
         trend[1] *= not straight
         mean = (basis @ trend).reshape(-1, 3, 3)
         return mean if turned is None else mean @ np.swapaxes(turned, 1, 2)
