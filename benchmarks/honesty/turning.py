@@ -53,6 +53,29 @@ def spin(rng: np.random.Generator, imu: Any = None) -> Mapping[str, Any]:
     }
 
 
+def afloat(rng: np.random.Generator, imu: Any) -> Mapping[str, Any]:
+    """An IMU that something spins on a base that sways: a mast that turns, of which nothing is said."""
+    swing, rate = np.exp(rng.uniform(np.log((0.02, 0.5)), np.log((1.0, 25.0))))
+
+    def tone() -> dict[str, str]:
+        size, period = swing * rng.uniform(0.3, 1.0), rng.uniform(3.0, 12.0)
+        return {
+            "amplitude": f"{size:.4f} deg",
+            "period": f"{period:.2f} s",
+            "phase": f"{rng.uniform(0.0, 360.0):.1f} deg",
+        }
+
+    tones = {name: [tone()] for name in ("heading", "pitch", "roll")}
+    return {
+        "duration": f"{rng.uniform(100.0, 400.0):.1f} s",
+        "rate": "100 Hz",
+        "position": place(rng),
+        "motion": {"kind": "sway", "heading": f"{rng.uniform(-180.0, 180.0):.1f} deg", "tones": tones},
+        "imu": imu,
+        "indexer": {"axes": [{"kind": "spin", "direction": "z", "rate": f"{rate:.2f} deg/s"}]},
+    }
+
+
 def by(imu: Any) -> Any:
     def call(log: Log) -> Alignment:
         return align(log.record, log.position, imu)
@@ -73,6 +96,14 @@ CASES = (
     Case("tilted spin, consumer, given", lambda rng: spin(rng, "consumer"), by("consumer"), LEVEL, of_imu=True),
     Case("tilted spin, industrial, given", lambda rng: spin(rng, "industrial"), by("industrial"), LEVEL, of_imu=True),
     Case("tilted spin, low cost, no specification", spin, by(None), LEVEL, of_imu=True),
+    Case("tilted spin, tactical, no specification", lambda rng: spin(rng, "tactical"), by(None), LEVEL, of_imu=True),
+    Case(
+        "spin on a ship, tactical, no specification", lambda rng: afloat(rng, "tactical"), by(None), LEVEL, of_imu=True
+    ),
+    Case("spin on a ship, tactical, given", lambda rng: afloat(rng, "tactical"), by("tactical"), LEVEL, of_imu=True),
+    Case(
+        "spin on a ship, industrial, given", lambda rng: afloat(rng, "industrial"), by("industrial"), LEVEL, of_imu=True
+    ),
 )
 
 if __name__ == "__main__":
