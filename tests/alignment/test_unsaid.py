@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from truenorth import align, imu_spec
+from truenorth import Indexer, align, imu_spec
 from truenorth.advice.positions import advise
 from truenorth.alignment.unsaid import as_usual, completed
 from truenorth.campaign.fault_benches import BENCHES, misses
@@ -15,6 +15,7 @@ from truenorth.core.errors import DataError
 from truenorth.records import ImuRecord
 from truenorth.records.presets import PRESETS
 from truenorth.records.specs import ImuSpec
+from truenorth.simulation.scenario import read_scenario
 
 NOISE = {s: {"random_walk": PRESETS["tactical"][s]["random_walk"]} for s in ("gyro", "accel")}
 KALIBR = {
@@ -83,6 +84,21 @@ def test_a_file_that_says_so_names_none():
         | {"imu": ImuSpec(gyro_random_walk=numbers.gyro_random_walk, accel_random_walk=numbers.accel_random_walk)}
     )
     assert np.array_equal(said.phi_covariance, by_numbers.phi_covariance)
+
+
+@pytest.mark.parametrize("kind", ["rotary", "spin"])
+def test_an_imu_without_any_bias_has_an_answer_that_is_a_number(kind):
+    """The share of a bias that is zero was 0 / 0: biases of an answer were no numbers."""
+    scenario = {"name": "no bias", "duration": "60 s", "position": {"lat": "40 deg", "lon": "10 deg"}}
+    scenario |= {"imu": noise_of(imu_spec("navigation")) | {"unnamed": "zero"}}
+    turns = {"axes": [{"kind": "spin", "direction": "z", "rate": "12 deg/s"}], "encoder": {"resolution": "1 arcsec"}}
+    scenario |= {"motion": {"kind": "rest", "pitch": "2 deg"}, "indexer": turns}
+    drawn = read_scenario(scenario)
+    aid = Indexer(drawn.simulate_aiding(seed=1)["encoder"].record, ("z",)) if kind == "rotary" else ()
+    answer = align(drawn.simulate(seed=1).record, (40.0, 10.0), drawn.imu_spec, aid=aid)
+    assert np.array_equal(answer.gyro_bias, np.zeros(3))
+    assert np.array_equal(answer.accel_bias_sigma, np.zeros(3))
+    assert np.isfinite(answer.phi_covariance).all()
 
 
 def test_what_is_named_stays():
