@@ -178,7 +178,7 @@ def align_rotary(
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
     evidence = _of_encoder(record, encoder, axes, task, spec)
-    evidence += [] if encoder is None else jump_evidence(carried.time, carried.by_gyros, carried.turned)
+    evidence += [] if encoder is None else jump_evidence(carried.time, carried.by_gyros, carried.turned, carried.steps)
     evidence += _of_filter(answer, fine, spec, task, given=given is not None)
     if isinstance(fine, SwayAlignment):
         anew = aligned_anew(fine, start, mount, _turned(spec))
