@@ -55,7 +55,7 @@ LARGEST = 0.2  # entry of a step
 # her filter leaves out: less than this is in sigma, and refuses no log.
 EXACT = 5e-4
 ONE = np.eye(3, dtype=np.bool_)
-LATE = ("response.gyros_late", "response.gyros_early")
+LATE = ("response.gyros_late", "response.gyros_early", "response.gyro_late")
 
 
 class _Found(NamedTuple):
