@@ -114,7 +114,7 @@ def test_what_may_be_a_push_as_well_is_in_sigma(in_doubt, monkeypatch):
 
 @pytest.mark.parametrize("run", some([5], [1, 8]))
 def test_accelerometers_that_are_turned_are_not_the_gyros_alone(run):
-    """By .05 deg: level, which is theirs, is off by the turn. It was 12 to 14 sigmas off, `aligned`: no log shows which is turned."""
+    """By .05 deg: level, which is theirs, is off by the turn. No log shows which is turned: 12 to 14 sigmas off, `aligned`."""
     inputs, _ = BENCHES["swaying"].draw(6100, run)
     record = inputs["record"]
     R = dcm_from_rotation_vector(np.radians([0.035, -0.035, 0.0]))

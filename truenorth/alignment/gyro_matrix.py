@@ -3,9 +3,9 @@
 Gyros that see ``(I + M) w`` are scaled, askew, or turned as a block against the accelerometers. By ``M`` times the sway gravity
 swings with the tilt: along it by a scale factor, across by a turned axis. A block that is turned by `a` about the vertical finds
 another north by `a`. Whether the gyros are turned or the accelerometers, no log shows: level is that of the accelerometers, and of
-a body whose gyros sit right it is off by the turn. So what of a turn is about level axes counts as an error of level. Pieces of 20 s show a turn to .1 to .6 deg, a scale factor to 3 % (:mod:`truenorth.quality.tilt`), behind all
-that the base does of its own, and behind its arm, which swings in the same way. The filter of the answer has the base's motion and
-the arm among its states.
+a body whose gyros sit right it is off by the turn. So what of a turn is about level axes counts as an error of level. Pieces of 20
+s show a turn to .1 to .6 deg, a scale factor to 3 % (:mod:`truenorth.quality.tilt`), behind all that the base does of its own, and
+behind its arm, which swings in the same way. The filter of the answer has the base's motion and the arm among its states.
 
 First it is asked what each entry of ``M`` does to its measurements: the squares that this explains are a chi-square of nine degrees
 of freedom where the gyros are as their specification says (19 on the average of 24 sound sways, 4 of indexers). Where they are

@@ -1,12 +1,12 @@
 """Is one gyro of a base that sways, or of an IMU that turns on it, later than the two others? By the filter's own response to it.
 
-Of gyros that are late together gravity is askew by the rate times the delay (:mod:`truenorth.alignment.late_gyros`). Where one alone
-is late, turns about two axes no longer belong together as well: a base that rolls and turns comes out tilted by half the product of
-both, which no bias and no common delay makes. So the gyro about the vertical shows itself, too, about which gravity says nothing.
-Navigation grade gyros on a base that sways by some degrees show .1 ms of it.
+Of gyros that are late together gravity is askew by the rate times the delay (:mod:`truenorth.alignment.late_gyros`). Where one
+alone is late, turns about two axes no longer belong together as well: a base that rolls and turns comes out tilted by half the
+product of both, which no bias and no common delay makes. So the gyro about the vertical shows itself, too, about which gravity says
+nothing. Navigation grade gyros on a base that sways by some degrees show .1 ms of it.
 
-Twice the logarithm of the likelihood ratio of each gyro's own delay is a chi-square of one degree of freedom where the clocks agree.
-It has to exceed that of a delay of all three by the limit of a drift, which chance passes once in a million. Then the gyro is put
+Twice the logarithm of the likelihood ratio of each gyro's own delay is a chi-square of one degree of freedom where clocks agree. It
+has to exceed that of a delay of all three by the limit of a drift, which chance passes once in a million. Then the gyro is put
 right and the log aligned anew, its motion fitted anew. Waves that push a ship in step with her tilt look like a delay of a gyro as
 well, by 40 to 70: of what the gyro put right explains they leave most (:mod:`truenorth.alignment.put_right`).
 """
