@@ -112,6 +112,18 @@ def test_what_may_be_a_push_as_well_is_in_sigma(in_doubt, monkeypatch):
         assert answer.status == "inconsistent"
 
 
+@pytest.mark.parametrize("run", some([5], [1, 8]))
+def test_accelerometers_that_are_turned_are_not_the_gyros_alone(run):
+    """By .05 deg: level, which is theirs, is off by the turn. No log shows which is turned: 12 to 14 sigmas off, `aligned`."""
+    inputs, _ = BENCHES["swaying"].draw(6100, run)
+    record = inputs["record"]
+    R = dcm_from_rotation_vector(np.radians([0.035, -0.035, 0.0]))
+    answer = BENCHES["swaying"].align(inputs | {"record": replace(record, accel=record.accel @ R.T)})
+    (found,) = (item for item in answer.evidence if item.key == "tilt.turned")
+    assert np.degrees(found.effect.level) == pytest.approx(0.05, abs=0.012)
+    assert answer.status == "inconsistent"
+
+
 @pytest.mark.parametrize("degrees", [[0.0, 0.0, 0.0], [0.1, -0.26, -0.22]])
 def test_a_turn_on_an_indexer_is_refused(degrees):
     """193 sigmas of heading, `aligned`."""

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.indexing import DIRECTIONS, C_bs_from_angles
+from truenorth.quality.encoder_steps import ROUNDED, resolution
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.strapdown.increments import increments
 
@@ -25,7 +26,7 @@ COVER = 0.05  # s by which an encoder's log may begin late or end early
 ROUNDING = 1e-3  # of a row, by which stamps of one moment differ: beyond the edges the gyros say nothing
 FEWEST = 4  # rows that a spline needs
 MOST_DIFFERENCES = 8
-NONE = (np.empty(0), np.empty((0, 0)), np.empty((0, 0)))
+NONE = (np.empty(0), np.empty((0, 0)), np.empty((0, 0)), np.empty(0))
 PASSES = 2  # the direction of an outer axis in the IMU is known by straight lines at first
 
 
@@ -49,6 +50,9 @@ class CarriedAngles:
         Of the encoder's rows.
     by_gyros, turned : (N, A) arrays, rad
         There by how much the gyros turn about the axes, and the angles more than these: the turn of the body.
+    steps : (A,) array, rad
+        Of the encoder's resolution, zero where its angles show none. Where an axis rests a part of a step is an error of the angle
+        that each row repeats.
     """
 
     record: EncoderRecord
@@ -59,16 +63,20 @@ class CarriedAngles:
     time: Array
     by_gyros: Array
     turned: Array
+    steps: Array
 
     def sigma(self, time: float) -> float:
-        """One sigma at a time (s), rad: noise of the rows, and what the body may have turned since the last one.
+        """One sigma at a time (s), rad: noise of rows or a part of a step, and what the body may have turned since the last one.
 
         Beyond it the angle goes on by the spline's tangent, the slope of a cubic through its last four rows,
         ``(11/6, -3, 3/2, -1/3)/step``, with their noise.
         """
         beyond = max(time - self.last, 0.0)
         rows = beyond / self.step * np.array([11.0 / 6.0, -3.0, 1.5, -1.0 / 3.0]) + (1.0, 0.0, 0.0, 0.0)
-        return math.hypot(self.noise * float(np.linalg.norm(rows)), 0.5 * self.swing * beyond**2)
+        part = math.sqrt(
+            max((ROUNDED * float(self.steps.max(initial=0.0))) ** 2 - self.noise**2, 0.0)
+        )  # noise has the rest of it
+        return math.hypot(self.noise * float(np.linalg.norm(rows)), part, 0.5 * self.swing * beyond**2)
 
 
 def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str]) -> CarriedAngles:
@@ -116,7 +124,7 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     swing = float(np.sqrt(np.max(np.mean(of_body(time, 2) ** 2, axis=0))))
     noise, step = _white(own), float(np.median(np.diff(time)))
     carried = replace(encoder, time=edges, angles=_shaped(angles))
-    return CarriedAngles(carried, float(time[-1]), step, swing, noise, time, at_rows, own)
+    return CarriedAngles(carried, float(time[-1]), step, swing, noise, time, at_rows, own, resolution(given, own))
 
 
 def _white(y: Array) -> float:

@@ -2,9 +2,10 @@
 
 Gyros that see ``(I + M) w`` are scaled, askew, or turned as a block against the accelerometers. By ``M`` times the sway gravity
 swings with the tilt: along it by a scale factor, across by a turned axis. A block that is turned by `a` about the vertical finds
-another north by `a`. Pieces of 20 s show a turn to .1 to .6 deg, a scale factor to 3 % (:mod:`truenorth.quality.tilt`), behind all
-that the base does of its own, and behind its arm, which swings in the same way. The filter of the answer has the base's motion and
-the arm among its states.
+another north by `a`. Whether the gyros are turned or the accelerometers, no log shows: level is that of the accelerometers, and of
+a body whose gyros sit right it is off by the turn. So what of a turn is about level axes counts as an error of level. Pieces of 20
+s show a turn to .1 to .6 deg, a scale factor to 3 % (:mod:`truenorth.quality.tilt`), behind all that the base does of its own, and
+behind its arm, which swings in the same way. The filter of the answer has the base's motion and the arm among its states.
 
 First it is asked what each entry of ``M`` does to its measurements: the squares that this explains are a chi-square of nine degrees
 of freedom where the gyros are as their specification says (19 on the average of 24 sound sways, 4 of indexers). Where they are
@@ -22,6 +23,7 @@ noise makes more than a sigma of a scale factor, that one is left out.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -53,7 +55,7 @@ LARGEST = 0.2  # entry of a step
 # her filter leaves out: less than this is in sigma, and refuses no log.
 EXACT = 5e-4
 ONE = np.eye(3, dtype=np.bool_)
-LATE = ("response.gyros_late", "response.gyros_early")
+LATE = ("response.gyros_late", "response.gyros_early", "response.gyro_late")
 
 
 class _Found(NamedTuple):
@@ -101,11 +103,23 @@ def gyro_matrix_evidence(
     if in_doubt and np.abs(found.M).max() > OPEN[-1]:  # no gyro, but what waves do is as large as that
         return []
     moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, found.fine))))
-    if not np.any(moved > limit("negligible") * np.sqrt(np.diag(fine.P)[PHI])):
+    key, figures = _named(found.M, found.sigma)
+    askew = _askew(fine, found.M) if key == "tilt.turned" else 0.0
+    if not np.any(np.append(moved, askew) > limit("negligible") * np.sqrt(np.diag(fine.P)[PHI])[[0, 1, 2, 0]]):
         return []
-    effect = Effect(heading=float(moved[2]), level=float(np.hypot(moved[0], moved[1])))
+    effect = Effect(heading=float(moved[2]), level=math.hypot(moved[0], moved[1], askew))
     in_doubt = in_doubt or float(np.abs(found.M).max()) < EXACT
-    return [Evidence(*_named(found.M, found.sigma), "hint" if in_doubt else "bounded", effect, ("imu_axes", "units"))]
+    return [Evidence(key, figures, "hint" if in_doubt else "bounded", effect, ("imu_axes", "units"))]
+
+
+def _askew(fine: SwayAlignment, M: Array) -> float:
+    """How far gravity is from where the accelerometers see it, rad, if the gyros are the body's and the accelerometers are turned.
+
+    Of ``M`` the part that turns a block, less what of that is about the vertical.
+    """
+    turn = 0.5 * np.array([M[2, 1] - M[1, 2], M[0, 2] - M[2, 0], M[1, 0] - M[0, 1]])
+    up = (fine.C_n0_i @ fine.integrals.C_mean)[:, 2]  # of n0, along the IMU's axes
+    return float(np.linalg.norm(np.cross(up, turn), axis=1).max())
 
 
 def _seen(record: ImuRecord, imu: ImuSpec, sigma: Array) -> Mask:

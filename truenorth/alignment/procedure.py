@@ -28,6 +28,7 @@ from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
+from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.put_right import aligned_anew
@@ -335,7 +336,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogChe
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
         anew = aligned_anew(fine, start, turned=turned, axes=spec)
-        steps += scale_on_sway_evidence(fine, task.record, anew)
+        steps += late_gyro_evidence(fine, task.record, anew) + scale_on_sway_evidence(fine, task.record, anew)
         steps += gyro_matrix_evidence(fine, task.record, used, anew, steps)
     way = farthest(fine, task.position) if swung else math.inf
     left = _moves_on(task, fine) if swung else None

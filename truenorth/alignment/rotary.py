@@ -25,6 +25,7 @@ from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.encoder_angles import angles_at, carried_angles
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
+from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
@@ -178,10 +179,11 @@ def align_rotary(
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
     evidence = _of_encoder(record, encoder, axes, task, spec)
-    evidence += [] if encoder is None else jump_evidence(carried.time, carried.by_gyros, carried.turned)
+    evidence += [] if encoder is None else jump_evidence(carried.time, carried.by_gyros, carried.turned, carried.steps)
     evidence += _of_filter(answer, fine, spec, task, given=given is not None)
     if isinstance(fine, SwayAlignment):
         anew = aligned_anew(fine, start, mount, _turned(spec))
+        evidence += late_gyro_evidence(fine, record, anew)
         evidence += gyro_matrix_evidence(fine, record, spec, anew, evidence)
     return judged(answer, evidence, heading_limit)
 

@@ -29,11 +29,12 @@ TURNS = 0.05  # of its largest rate: an axis that turns counts the steps of its 
 LONGEST = 4  # times the rows that a step is fitted to: what lasts for longer is no jump
 LATE = 0.05  # s: an encoder that is late by less looks so where its axis starts or stops
 NEAR = 10  # rows about a jump in which that may be
+ONE_COUNT = 1.2  # steps of a resolution, as a fit to noisy rows may read one
 SELDOM = 0.02  # of the rows: what is more frequent is noise
 BEYOND = 2.326  # sigmas, that a normal variable exceeds as seldom
 
 
-def jump_evidence(time: Array, by_gyros: Array, turned: Array) -> list[Evidence]:
+def jump_evidence(time: Array, by_gyros: Array, turned: Array, steps: Array | None = None) -> list[Evidence]:
     """Jumps of an encoder's angles.
 
     Parameters
@@ -42,6 +43,9 @@ def jump_evidence(time: Array, by_gyros: Array, turned: Array) -> list[Evidence]
         Of the encoder's rows.
     by_gyros, turned : (N, A) arrays, rad
         By which the gyros turn about each axis, and its angle more than these.
+    steps : (A,) array, rad, optional
+        Of its resolution. As an axis begins to turn, or goes on by a step in some rows, a count of one is no slip: a part of it is
+        in sigma.
     """
     if len(time) < FEWEST:
         return []
@@ -55,7 +59,9 @@ def jump_evidence(time: Array, by_gyros: Array, turned: Array) -> list[Evidence]
             rate = np.diff(own[:, axis], append=own[-1, axis]) / step
             for row, size in _jumps(more[:, axis], np.abs(rate) > TURNS * float(np.max(np.abs(rate)))):
                 near = rate[max(row - NEAR, 0) : row + NEAR]
-                if abs(size) < LATE * float(np.ptp(near)):
+                if abs(size) < max(
+                    LATE * float(np.ptp(near)), 0.0 if steps is None else ONE_COUNT * float(steps[axis])
+                ):
                     continue
                 figures: dict[str, Figure] = {"axis": str(axis + 1), "size": size, "time": float(even[row])}
                 kind: Kind = "bounded" if abs(size) > USUAL_ZERO else "known"

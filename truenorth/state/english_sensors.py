@@ -21,6 +21,10 @@ OF_SENSORS = {
         "gyros {delay:.4f} s early against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
         "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
     ),
+    "response.gyro_late": (
+        "the {axis} gyro {delay:+.4f} s late against the two others fits the log better (likelihood ratio {ratio:.0f}, chance "
+        "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
+    ),
     "axes.half_turn": (
         "gyros turned by half a turn about the vertical, x and y reversed, fit the measurements better (likelihood ratio "
         "{ratio:.0f}, chance gives {chance:.0f} at most): gyros and accelerometers have other axes"
