@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from truenorth.simulation.normals import BLOCK, Normals, draw, normals_of, words_of
+from truenorth.simulation.normals import BLOCK, Normals, draw, first_normals, normals_at, normals_of, words_of
+from truenorth.simulation.streams import stream
 
 
 def numbers(normals: Normals, count: int) -> np.ndarray:
@@ -36,3 +37,19 @@ def test_the_generator_can_go_on_behind_them(count):
     rng.bit_generator.advance(words_of(normals))
     other.standard_normal(count)
     assert rng.bit_generator.state == other.bit_generator.state
+
+
+@pytest.mark.parametrize(
+    "numbers_of_stream", [(0, 0, 0, 0), (7, 3, 999, 14), (2**32 - 1, 2**32, 1, 2), (2**150 + 9, 2**40 + 7, 2**32, 3)]
+)
+def test_a_stream_begins_as_numpy_begins_it(numbers_of_stream):
+    found, expected = normals_at(*numbers_of_stream), normals_of(stream(*numbers_of_stream))
+    assert np.array_equal(found.state, expected.state)
+    assert np.array_equal(found.factors, expected.factors)
+    first = stream(*numbers_of_stream).standard_normal((3, 3))
+    assert np.array_equal(first_normals((3, 3), *numbers_of_stream), first)
+
+
+def test_a_stream_has_no_negative_numbers():
+    with pytest.raises(ValueError, match="negative"):
+        normals_at(0, 0, -1, 2)

@@ -152,7 +152,9 @@ class FineAlignment(Filtered):
 
     def departures(self) -> Array:
         """(K, 3) how far the attitude known at each epoch is off the final one at the same time: phi in ``n0``, rad."""
-        turned = self.integrals.intervals[:, None] * (self.integrals.C_mean @ self.end[BG])
+        turned = self.integrals.intervals[:, None] * (self.integrals.C_mean.reshape(-1, 3) @ self.end[BG]).reshape(
+            -1, 3
+        )
         # int from each epoch to the end of C_n0_b dt, with the final residual bias: the final answer carried back.
         after = np.zeros_like(turned)
         np.cumsum(turned[:0:-1], axis=0, out=after[-2::-1])
@@ -241,7 +243,7 @@ def settle_fine(
         gained = gained_velocity(log.integrals, C_n0_i, position.lat, position.alt)
         R = np.maximum(white_variance(gained) - expected, max(SLIGHT * expected, QUIETEST_BASE**2))
     everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
-    noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES, history=history)
+    noise = VelocityNoise(np.full((len(everywhere), 3), R), [everywhere], MAX_NOISE_PASSES, history=history)
     most = BENT_PASSES if bent else MAX_PASSES
     last = settle(log, noise, left_over(float(log.integrals.time[-1])), most=most)
     return log, last, np.sqrt(noise.R[0])

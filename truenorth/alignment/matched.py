@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import FineAlignment
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, four_rows_within, mirror_upper, transpose_block
-from truenorth.core.vectors import load8, store8
+from truenorth.core.vectors import load8, minus8, over8, plus8, product8, spread8, store8, times8, zero8
 from truenorth.errors.staying import STARTS
 from truenorth.filters.gains import Gains, through
 
@@ -286,14 +286,14 @@ def _sum_back(
     for i in range(3):
         end[i, misalignment + i] = 1.0
     form_before, end_before, T = np.zeros_like(form), np.zeros_like(end), np.zeros_like(form)
-    # e goes on as F (e, w), and is seen, made white, as G (e, w); behind G stand the innovations.
-    whole, course = np.zeros((N, N)), np.zeros((N, wide))
+    # e goes on as F (e, w), and is seen, made white, as G (e, w), which stands below T; behind G stand the innovations.
+    whole, course, measured, ones = np.zeros((N, N)), np.zeros((N, wide)), np.zeros((m, wide)), np.zeros(wide)
     for i in range(n):
         course[i, i] = 1.0
         for j in range(U.shape[1]):
             course[i, n + j] = U[i, j]
-    F, G = np.zeros((N, wide)), np.zeros((m, wide))
-    above_t, below = np.zeros((rows, N + m)), np.zeros((n + m, wide))
+    ones[n:] = 1.0
+    F, above_t, below = np.zeros((N, wide)), np.zeros((rows, N + m)), np.zeros((n + m, wide))
     row = len(behind) - 1
     for k in range(step.shape[0] - 1, -1, -1):
         while row >= 0 and behind[row] == k:
@@ -303,33 +303,31 @@ def _sum_back(
         if row < 0:
             break
         copy_corner(step[k], whole, n, n)
-        _go_on(whole, H_Phi[k], gain[k], A[k], course, F, G)
-        _whiten(L[k], used, G)
+        for i in range(m):
+            for j in range(A.shape[2]):
+                measured[i, n + j] = A[k, i, j]
+        _go_on(whole, gain[k], measured, course, F)
+        _see(H_Phi[k], L[k], measured, course, below)
         for i in range(m):
             for j in range(right):
-                G[i, used + j] = seen[k, i, j]
-        _times_course(n, form, F, T)
+                below[n + i, used + j] = seen[k, i, j]
+        _times_course(n, form, F, ones, T)
         # [F; G]' [T; G], and T itself of the courses: M' form M + G' G.
         for i in range(0, rows, 4):
             for j in range(0, N, 4):
                 transpose_block(F, j, i, above_t)
         for i in range(m):
             for j in range(used):
-                above_t[j, n + i] = G[i, j]
-        for i in range(n + m):
-            for j in range(wide):
-                below[i, j] = T[i, j] if i < n else G[i - n, j]
+                above_t[j, n + i] = below[n + i, j]
+        copy_corner(T, below, n, wide)
         for i in range(0, rows, 4):  # what stands before the diagonal is what stands behind it
-            four_rows_within(n + m, above_t, below, None, i, i, wide, form_before)
+            four_rows_within(n + m, above_t, below, None, i, 8 * (i // 8), wide, form_before)
         for i in range(n, rows):
-            for j in range(wide):
-                form_before[i, j] += T[i, j]
-        mirror_upper(4 * (used // 4), form_before)
-        for i in range(4 * (used // 4), used):
-            for j in range(i):
-                form_before[i, j] = form_before[j, i]
+            for j in range(8 * (i // 8), wide, 8):
+                store8(form_before, (i, j), plus8(load8(form_before, (i, j)), load8(T, (i, j))))
+        mirror_upper(rows, form_before)
         form, form_before = form_before, form
-        _times_course(n, end, F, end_before)
+        _times_course(n, end, F, ones, end_before)
         end, end_before = end_before, end
 
 
@@ -342,45 +340,46 @@ def _keep(values: Any, place: Any) -> None:
 
 
 @borrowing(forceinline=True)
-def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, course: Any, F: Any, G: Any) -> None:
-    """``F = step [I, U] - gain [0, A]`` and ``G = H Phi [I, U] + [0, A]``, with ``course = [I, U]``."""
-    n, m = gain.shape[0], gain.shape[1]
-    known = 8 * (n // 8)  # columns of the step itself
+def _go_on(step: Any, gain: Any, A: Any, course: Any, F: Any) -> None:
+    """``F = step [I, U] - gain [0, A]``, with ``course = [I, U]``; `A` stands where the courses do."""
+    n, known = gain.shape[0], 8 * (gain.shape[0] // 8)  # columns of the step itself
     for i in range(0, len(step), 4):
         four_rows_within(n, step, course, None, i, known, F.shape[1], F)
     for i in range(n):
         for j in range(0, known, 8):
             store8(F, (i, j), load8(step, (i, j)))
-    for i in range(n):
-        for r in range(m):
-            for j in range(A.shape[1]):
-                F[i, n + j] -= gain[i, r] * A[r, j]
+        for j in range(known, F.shape[1], 8):
+            left = load8(F, (i, j))
+            for r in range(gain.shape[1]):
+                left = minus8(left, times8(gain[i, r], load8(A, (r, j))))
+            store8(F, (i, j), left)
+
+
+@borrowing(forceinline=True)
+def _see(H_Phi: Any, L: Any, A: Any, course: Any, below: Any) -> None:
+    """``G = L^-1 (H Phi [I, U] + [0, A])``, L lower triangular, below the rows of T."""
+    m, n = H_Phi.shape
+    known = 8 * (n // 8)
     for i in range(m):
-        for j in range(G.shape[1]):
-            G[i, j] = 0.0
-        for r in range(n):
-            for j in range(G.shape[1]):
-                G[i, j] += H_Phi[i, r] * course[r, j]
-        for j in range(A.shape[1]):
-            G[i, n + j] += A[i, j]
+        for j in range(0, below.shape[1], 8):
+            if j < known:
+                total = load8(H_Phi, (i, j))
+            else:
+                total = zero8()
+                for r in range(n):
+                    total = plus8(total, times8(H_Phi[i, r], load8(course, (r, j))))
+                total = plus8(total, load8(A, (i, j)))
+            for r in range(i):
+                total = minus8(total, times8(L[i, r], load8(below, (n + r, j))))
+            store8(below, (n + i, j), over8(total, spread8(L[i, i])))
 
 
 @borrowing(forceinline=True)
-def _whiten(L: Any, used: int, G: Any) -> None:
-    """``G = L^-1 G`` of the columns used, L lower triangular."""
-    for i in range(G.shape[0]):
-        for r in range(i):
-            for j in range(used):
-                G[i, j] -= L[i, r] * G[r, j]
-        for j in range(used):
-            G[i, j] /= L[i, i]
-
-
-@borrowing(forceinline=True)
-def _times_course(n: int, X: Any, F: Any, Y: Any) -> None:
-    """``Y = X M`` with ``M = [F; 0 I]``, the identity behind the first n."""
+def _times_course(n: int, X: Any, F: Any, ones: Any, Y: Any) -> None:
+    """``Y = X M`` with ``M = [F; 0 I]``, the identity behind the first n, where `ones` are; of rows of courses the upper half."""
     for i in range(0, X.shape[0], 4):
-        four_rows_within(n, X, F, None, i, 0, Y.shape[1], Y)
+        first = 8 * (i // 8) if i >= n else 0
+        four_rows_within(n, X, F, None, i, first, Y.shape[1], Y)
     for i in range(X.shape[0]):
-        for j in range(n, Y.shape[1]):
-            Y[i, j] += X[i, j]
+        for j in range(8 * (max(n, i) // 8), Y.shape[1], 8):
+            store8(Y, (i, j), plus8(load8(Y, (i, j)), product8(load8(ones, (j,)), load8(X, (i, j)))))

@@ -102,7 +102,7 @@ def rocks_all_along(motion: MotionSummary) -> bool:
     does a base that rocks pause: the rate of an IMU that was turned for a while is steady before and after, and where the log
     is too short for ten seconds of rest its wander is that of the turn.
     """
-    if not motion.kind.size:
+    if sum(motion.fraction(kind) for kind in (*ROCKING, "rotating")) < 0.9 * MOSTLY:
         return False
     rocks = np.array([kind in ROCKING for kind in KINDS])[motion.kind]
     turns = motion.kind == KINDS.index("rotating")

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from truenorth.coarse.wahba import triad
 from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
-from truenorth.core.linalg import add_rows
 from truenorth.records import ImuRecord
 from truenorth.records.vibration import cone_drift
 from truenorth.strapdown.increments import in_blocks, read_only
@@ -72,12 +71,16 @@ def scatter_of(x: Array) -> Array:
 def _block_sums(steps: Any, dtheta: Any, dvel: Any, edges: Any, sums: Any) -> None:
     """Add time, angle and velocity of the rows between edges (B + 1,) to sums (B, 7)."""
     for b in range(len(sums)):
-        T, before = sums[b, 0], (sums[b, 1], sums[b, 2], sums[b, 3], sums[b, 4], sums[b, 5], sums[b, 6])
-        for k in range(edges[b], edges[b + 1]):
+        T, w0, w1, w2, f0, f1, f2 = sums[b, 0], sums[b, 1], sums[b, 2], sums[b, 3], sums[b, 4], sums[b, 5], sums[b, 6]
+        for k in range(edges[b], edges[b + 1]):  # seven sums that do not wait for each other
             T += steps[k]
-        sums[b, 0] = T
-        after = add_rows(dtheta, dvel, edges[b], edges[b + 1], before)
-        sums[b, 1], sums[b, 2], sums[b, 3], sums[b, 4], sums[b, 5], sums[b, 6] = after
+            w0 += dtheta[k, 0]
+            w1 += dtheta[k, 1]
+            w2 += dtheta[k, 2]
+            f0 += dvel[k, 0]
+            f1 += dvel[k, 1]
+            f2 += dvel[k, 2]
+        sums[b, 0], sums[b, 1], sums[b, 2], sums[b, 3], sums[b, 4], sums[b, 5], sums[b, 6] = T, w0, w1, w2, f0, f1, f2
 
 
 def static_jacobian(lat: float, g: float) -> Array:

@@ -71,7 +71,7 @@ class StaticModel(Walks):
             The nominal attitude at the start.
         lat, alt : float, rad and m
         P0 : (12, 12) array
-            Covariance before the first interval.
+            Covariance before the first interval, as it must be: it is not checked.
         R : (3,) array, (m/s)^2
             Variance of the base's mean velocity over an interval (E, N, U).
         x0 : (12,) array, optional
@@ -88,8 +88,8 @@ class StaticModel(Walks):
         nominal = (np.ascontiguousarray(x) for x in (C_n0_i, integrals.C_mean, integrals.C_late))
         _transitions(integrals.intervals, *nominal, known.f, known.f_late, C_n_n0, Phi, H)
         z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-        with_log = known.noise.with_made(Phi=Phi, H=H, R=known.noise.R + np.diag(R), z=z)
-        return with_log.with_arrays(x0=np.zeros(STATES) if x0 is None else x0, P0=P0)
+        before = {"x0": np.zeros(STATES) if x0 is None else x0, "P0": np.ascontiguousarray(P0)}
+        return known.noise.with_made(Phi=Phi, H=H, R=known.noise.R + np.diag(R), z=z, **before)
 
 
 @compiled

@@ -132,7 +132,9 @@ class VelocityNoise:
         history: bool = True,
         coloured: bool = True,
     ) -> None:
-        self.R, self.parts, self.most, self.history = R, parts, most, history
+        self.R, self.most, self.history = R, most, history
+        whole = len(parts) == 1 and parts[0].all()
+        self.rows: list[Any] = [slice(None)] if whole else list(parts)  # of each part
         self.colours = (False, True) if coloured else (False,)
 
     def __call__(self, quiet: LinearSystem) -> Filtered:
@@ -140,17 +142,16 @@ class VelocityNoise:
         system = self._with_motion(quiet)
         estimates = self._filtered(system)
         for colour in self.colours:
-            brackets = [_Bracket() for _ in self.parts]
+            brackets = [_Bracket() for _ in self.rows]
             for _ in range(self.most):
                 R, same = self.R.copy(), True
-                for part, bracket in zip(self.parts, brackets, strict=True):
-                    every = slice(None) if len(self.parts) == 1 and part.all() else part
-                    nu, covariance = estimates.innovation[every], estimates.innovation_covariance[every]
-                    before = self.R[every][0]
+                for rows, bracket in zip(self.rows, brackets, strict=True):
+                    nu, covariance = estimates.innovation[rows], estimates.innovation_covariance[rows]
+                    before = self.R[rows][0]
                     asked, expected = _variance_of(nu, covariance, before, colour)
-                    R[every] = bracket.within(before, asked)
+                    R[rows] = after = bracket.within(before, asked)
                     # The vertical carries no attitude.
-                    same &= bool(np.all(np.abs(R[every][0] - before)[:2] < SAME_NOISE * expected[:2]))
+                    same &= bool((np.abs(after - before)[:2] < SAME_NOISE * expected[:2]).all())
                 if same:
                     break
                 self.R = R
@@ -162,6 +163,6 @@ class VelocityNoise:
         return kalman(system, history="full" if self.history else "last", innovations=True)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
-        R = quiet.R + np.zeros((len(self.R), 1, 1))
+        R = np.array(np.broadcast_to(quiet.R, (len(self.R), 3, 3)))
         R.reshape(len(R), -1)[:, ::4] += self.R - QUIETEST_BASE**2  # its diagonal
         return quiet.with_made(R=R)

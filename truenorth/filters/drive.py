@@ -99,7 +99,8 @@ def drive(
         )
     _raise_failure(out, shape)
 
-    out = out._replace(**{name: a.reshape(shape + a.shape[1:]) for name, a in out._asdict().items()})
+    shaped: list[Any] = [a.reshape(shape + a.shape[1:]) if shape else a[0] for a in out]
+    out = Histories(*shaped)
     after = FilterState(out.x[..., -1, :], out.P[..., -1, :, :], out.log_likelihood, out.memory)
     of_rows = out.innovation, out.innovation_covariance, out.nis, out.log_likelihood
     return Estimates(out.x, out.sigma, out.P, *of_rows, after, out.adaptation)

@@ -98,11 +98,11 @@ def _fill(runs: Any, P: Any, innovation: Any, covariance: Any, gain: Any, step: 
                 for j in range(0, wide, 4):
                     transpose_block(Phi, i, j, Phi_t)
             # H (Phi P Phi' + Q) + S', of m rows, not n: covariances are symmetric.
+            rows_times(H, m, n, Phi, own)
+            rows_times(own, m, n, before, seen)
+            rows_times(seen, m, n, Phi_t, cross)
+            rows_times(H, m, n, Q, seen)
             for a in range(m):
-                row_times(H, a, n, Phi, own)
-                row_times(own, a, n, before, seen)
-                row_times(seen, a, n, Phi_t, cross)
-                row_times(H, a, n, Q, seen)
                 for i in range(n):
                     cross[a, i] += seen[a, i] + S[i, a]
                     H_Phi[b, k, a, i] = own[a, i]
@@ -130,6 +130,27 @@ def _fill(runs: Any, P: Any, innovation: Any, covariance: Any, gain: Any, step: 
 def load_corner(A: Any, B: Any) -> None:
     """A square matrix into the corner of a larger one."""
     copy_corner(A, B, A.shape[0], A.shape[1])
+
+
+@borrowing(forceinline=True)
+def rows_times(X: Any, rows: int, n: int, A: Any, Y: Any) -> None:
+    """The first rows of ``Y = X A``, of n terms; three at a time, so that each row of `A` is read once for them."""
+    a = 0
+    while a + 3 <= rows:
+        for j in range(0, A.shape[1], 8):
+            one, two, three = zero8(), zero8(), zero8()
+            for k in range(n):
+                row = load8(A, (k, j))
+                one = plus8(one, times8(X[a, k], row))
+                two = plus8(two, times8(X[a + 1, k], row))
+                three = plus8(three, times8(X[a + 2, k], row))
+            store8(Y, (a, j), one)
+            store8(Y, (a + 1, j), two)
+            store8(Y, (a + 2, j), three)
+        a += 3
+    while a < rows:
+        row_times(X, a, n, A, Y)
+        a += 1
 
 
 @borrowing(forceinline=True)
@@ -221,8 +242,7 @@ def _parts(step: Any, inner: Any, first: int, response: Any, part: Any) -> None:
         for i in range(n):
             for j in range(p):
                 before[i, j] = now[i, j]
-        for i in range(n):
-            row_times(step[k], i, n, before, now)
+        rows_times(step[k], n, n, before, now)
         for a in range(q):
             for r in range(p):
                 X[a, r] = 0.0

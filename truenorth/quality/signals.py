@@ -141,10 +141,10 @@ def _running_sums(gyro: Any, accel: Any, every: int, total: Any) -> None:
 
 def _lower_quartiles(values: Array) -> Array:
     """Of each column, between the two nearest in proportion: those of :func:`numpy.quantile`, which takes longer to begin."""
-    ordered = np.sort(values, axis=0)
     place = 0.25 * (len(values) - 1)
     below = int(place)
     above = min(below + 1, len(values) - 1)
+    ordered = np.partition(values, (below, above), axis=0)
     return np.asarray(ordered[below] + (place - below) * (ordered[above] - ordered[below]))
 
 
@@ -237,8 +237,10 @@ def _constant_part(mean: Array, wander: Array) -> Array:
 
 def median_of_rows(values: Array) -> Array:
     """(k, 1) median of each row: :func:`numpy.median`, which takes longer to begin."""
-    ordered, half = np.sort(values, axis=1), values.shape[1] // 2
-    return 0.5 * (ordered[:, [half]] + ordered[:, [half if values.shape[1] % 2 else half - 1]])
+    half = values.shape[1] // 2
+    before = half if values.shape[1] % 2 else half - 1
+    parted = np.partition(values, (before, half), axis=1)
+    return 0.5 * (parted[:, [half]] + parted[:, [before]])
 
 
 def bias_by_gravity(rate: Array, force: Array) -> Array | None:
@@ -309,8 +311,8 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
     first = offset(seconds, width)
     within = np.arange(seconds) - first
     half = width // 2
-    early = _medians(signal[:, : seconds - width + half], half)[:, first]
-    late = _medians(signal[:, width - half :], half)[:, first]
+    halves = _medians(signal, half)
+    early, late = halves[:, first], halves[:, first + (width - half)]
     line = early + (late - early) * (within - (half - 1) / 2.0) / (width - half)
     return _running_median(signal), line
 

@@ -27,10 +27,12 @@ Sources: F. B. Hildebrand, "Introduction to Numerical Analysis", 2nd ed. (1974),
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.compiled import compiled
 from truenorth.core.remembered import remembered
 from truenorth.records.imu import ImuRecord
 
@@ -38,7 +40,6 @@ Array = NDArray[np.float64]
 
 BLOCK = 20.0  # s, in which an engine runs as it does
 FEWEST = 32  # rows of a block
-ABREAST = 20  # rows
 LEAST_CONE = 2e-10  # rad/s, 4e-5 deg/h: no gyro has as small a bias
 
 SECOND = np.array([0.0, 0.0, 1.0, -2.0, 1.0, 0.0, 0.0])
@@ -78,12 +79,14 @@ def _cones(record: ImuRecord) -> Array:
     length = max(round(BLOCK / record.interval), FEWEST)
     rates = record.kind == "rates"
     unit = 1.0 if rates else 1.0 / record.interval
-    mean = np.ones(len(record)) @ record.gyro / len(record)
-    variance = unit**2 * (_squares(record.gyro) / len(record) - mean**2)
+    sums = np.empty((2, 3))
+    _sums(record.gyro, sums)
+    variance = unit**2 * (sums[1] / len(record) - (sums[0] / len(record)) ** 2)
     slowest = 2.0 * math.pi / (length * record.interval)
     blocks = len(record) // length if float(variance.max()) > LEAST_CONE * slowest else 0
     if not blocks:  # of rows that are nanoseconds apart a block's spectrum would fill the memory
         return np.empty((0, 3, 2))
+    mean = np.ones(len(record)) @ record.gyro / len(record)
     x = 2.0 * math.pi * np.arange(1, length // 2 + 1) / length
     shares = (share_left(x), np.ones_like(x)) if rates else (np.zeros_like(x), share_of_increments(x))
     # <theta x w>/2 of a tone of amplitude A: Im(A x conj(A))/(4 w), of whose two products each is the other's conjugate. A window
@@ -98,11 +101,16 @@ def _cones(record: ImuRecord) -> Array:
     return drift
 
 
-def _squares(rows: Array) -> Array:
-    """(3,) sums of the squares of columns (N, 3); twenty rows as one, over which a sum of NumPy takes a quarter of the time."""
-    whole = len(rows) // ABREAST * ABREAST
-    wide, rest = rows[:whole].reshape(-1, 3 * ABREAST), rows[whole:]
-    return np.asarray(np.einsum("ki,ki->i", wide, wide).reshape(-1, 3).sum(axis=0) + np.einsum("ki,ki->i", rest, rest))
+@compiled
+def _sums(rows: Any, sums: Any) -> None:
+    """Sums of columns (N, 3), and of their squares, in one pass: six of them, of which none waits for another."""
+    a = b = c = aa = bb = cc = 0.0
+    for k in range(len(rows)):
+        x, y, z = rows[k, 0], rows[k, 1], rows[k, 2]
+        a, b, c = a + x, b + y, c + z
+        aa, bb, cc = aa + x * x, bb + y * y, cc + z * z
+    sums[0, 0], sums[0, 1], sums[0, 2] = a, b, c
+    sums[1, 0], sums[1, 1], sums[1, 2] = aa, bb, cc
 
 
 def share_of_increments(x: Array) -> Array:

@@ -85,14 +85,16 @@ def of_random_walk(density: float, interval: float) -> Recursion:
     return _recursion(density**2, math.inf, 0.0, interval)
 
 
-def add_errors(
-    out: Array, bias: Array, recursion: Recursion, rng: np.random.Generator, white: np.random.Generator, walk: float
-) -> None:
-    """Add to increments (N, 3), in place and in this order, a bias (3,), what a recursion gives, and white noise of sigma `walk`.
+def with_errors(
+    x: Array, matrix: Array, bias: Array, recursion: Recursion, steps: Normals, white: Normals, walk: float
+) -> Array:
+    """Increments (N, 3) as sensors give them: ``(I + matrix) x``, a bias (3,), what a recursion gives, white noise of sigma `walk`.
 
-    The bits are those of one after the other: what wanders takes no memory.
+    The bits are those of one after the other, in this order: rows are passed over once, and what wanders takes no memory.
     """
-    _recur(recursion, normals_of(rng), bias, normals_of(white), walk, out)
+    out = np.empty_like(x)
+    _recur(recursion, steps, bias, white, walk, x, matrix, out)
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +136,7 @@ class Wander:
 def _drawn(recursion: Recursion, count: int, rng: np.random.Generator) -> Array:
     """Integrals of three axes, (count, 3)."""
     x, steps = np.zeros((count, 3)), normals_of(rng)
-    _recur(recursion, steps, np.zeros(3), steps, 0.0, x)
+    _recur(recursion, steps, np.zeros(3), steps, 0.0, x[:0], np.zeros((3, 3)), x)
     generator: Any = rng.bit_generator
     generator.advance(words_of(steps))
     return x
@@ -158,8 +160,13 @@ def _ramp(v: Array, tau: float) -> Array:
 
 
 @compiled
-def _recur(recursion: Any, steps: Normals, bias: Any, white: Normals, walk: float, out: Any) -> None:
-    """Add ``bias``, the recursion and white noise; what is drawn are the numbers of ``standard_normal((count + 1, 3))``."""
+def _recur(
+    recursion: Any, steps: Normals, bias: Any, white: Normals, walk: float, sensed: Any, matrix: Any, out: Any
+) -> None:
+    """Add ``bias``, the recursion and white noise to rows, or to what sensors of a `matrix` make of those that are `sensed`.
+
+    What is drawn are the numbers of ``standard_normal((count + 1, 3))``.
+    """
     d, alpha, beta, before = recursion.decay, recursion.alpha, recursion.beta, recursion.before
     e, w, e0 = np.empty((BLOCK, 3)), np.zeros((BLOCK, 3)), np.empty(3)
     flat, flat_w = e.reshape(-1), w.reshape(-1)
@@ -173,6 +180,8 @@ def _recur(recursion: Any, steps: Normals, bias: Any, white: Normals, walk: floa
         if walk > 0.0:
             draw(white, flat_w[: 3 * count])
         rows = out[first : first + count]
+        if len(sensed) > 0:
+            sense(sensed[first : first + count], matrix, rows)
         for k in range(count):
             x = decay * x + alpha * e[k, 0] + beta * a
             y = decay * y + alpha * e[k, 1] + beta * b
@@ -182,3 +191,13 @@ def _recur(recursion: Any, steps: Normals, bias: Any, white: Normals, walk: floa
             rows[k, 1] = ((rows[k, 1] + bias[1]) + y) + walk * w[k, 1]
             rows[k, 2] = ((rows[k, 2] + bias[2]) + z) + walk * w[k, 2]
             decay = d
+
+
+@compiled
+def sense(x: Any, matrix: Any, out: Any) -> None:
+    """``(I + matrix) x``."""
+    for k in range(len(x)):
+        a, b, c = x[k, 0], x[k, 1], x[k, 2]
+        out[k, 0] = a + matrix[0, 0] * a + matrix[0, 1] * b + matrix[0, 2] * c
+        out[k, 1] = b + matrix[1, 0] * a + matrix[1, 1] * b + matrix[1, 2] * c
+        out[k, 2] = c + matrix[2, 0] * a + matrix[2, 1] * b + matrix[2, 2] * c

@@ -26,10 +26,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.compiled import compiled
 from truenorth.records.specs import ImuSpec
-from truenorth.simulation.drift import Recursion, Wander, add_errors, of_gauss_markov, of_random_walk
-from truenorth.simulation.normals import BLOCK, Normals, draw, normals_of
+from truenorth.simulation.drift import Recursion, Wander, of_gauss_markov, of_random_walk, sense, with_errors
+from truenorth.simulation.normals import BLOCK, Normals, draw, normals_at
 from truenorth.simulation.response import respond
-from truenorth.simulation.streams import STREAMS, stream
+from truenorth.simulation.streams import STREAMS
 from truenorth.simulation.true_errors import SensorErrors, TrueErrors, drawn_errors
 
 Array = NDArray[np.float64]
@@ -58,22 +58,13 @@ def apply_errors(
     results = []
     for group, ideal in (("gyro", dtheta), ("accel", dvel)):
 
-        def stream_of(term: str, group: str = group) -> np.random.Generator:
-            return stream(seed, scenario, run, STREAMS[f"{group}_{term}"])
+        def stream_of(term: str, group: str = group) -> Normals:
+            return normals_at(seed, scenario, run, STREAMS[f"{group}_{term}"])
 
         def value(term: str, group: str = group) -> float:
             return float(getattr(spec, f"{group}_{term}"))
 
         own: SensorErrors = getattr(errors, group)
-        out = np.empty_like(ideal)
-        _sense(
-            *(np.ascontiguousarray(x) for x in (ideal, dvel, dT, own.matrix, own.g_sensitivity)),
-            own.scale_factor_temperature,
-            own.scale_factor_asymmetry,
-            out,
-        )
-        order = int(value("filter_order"))
-        out = respond(out, interval, bandwidth=value("bandwidth"), order=order, latency=value("latency"))
         bias, walk = own.constant_bias * interval, value("random_walk") * math.sqrt(interval)
         warmth = dT if own.bias_temperature.any() and dT.any() else None
         terms = {
@@ -81,17 +72,33 @@ def apply_errors(
             for term, recursion in _recursions(interval, value, spec.correlation_time).items()
         }
         wander = Wander(len(dT), interval, terms, warmth, own.bias_temperature)
-        if warmth is None and len(terms) == 1:
-            ((numbers, recursion),) = terms.items()
-            add_errors(out, bias, recursion, stream(*numbers), stream_of("random_walk"), walk)
+        late = math.isfinite(value("bandwidth")) or value("latency") != 0.0
+        one = warmth is None and len(terms) == 1
+        if one and own.is_linear and not late:
+            sensed, matrix = np.ascontiguousarray(ideal), own.matrix
         else:
+            sensed, matrix = np.empty_like(ideal), np.zeros((3, 3))
+            _sense(
+                *(np.ascontiguousarray(x) for x in (ideal, dvel, dT, own.matrix, own.g_sensitivity)),
+                own.scale_factor_temperature,
+                own.scale_factor_asymmetry,
+                sensed,
+            )
+            order = int(value("filter_order"))
+            sensed = respond(sensed, interval, bandwidth=value("bandwidth"), order=order, latency=value("latency"))
+        if one:
+            ((numbers, recursion),) = terms.items()
+            steps, white = normals_at(*numbers), stream_of("random_walk")
+            out = with_errors(sensed, matrix, bias, recursion, steps, white, walk)
+        else:
+            out = sensed
             out += bias
             if wander:
                 out += wander.integrals()
             if walk > 0.0:
-                _make_noise(out.reshape(-1), normals_of(stream_of("random_walk")), walk)
+                _make_noise(out.reshape(-1), stream_of("random_walk"), walk)
         if value("sample_noise") > 0.0:
-            _make_noise(out.reshape(-1), normals_of(stream_of("sample_noise")), value("sample_noise") * interval)
+            _make_noise(out.reshape(-1), stream_of("sample_noise"), value("sample_noise") * interval)
         full_scale, step = value("range") * interval, value("quantisation")
         if step > 0.0 or math.isfinite(full_scale):
             _put_out(out, full_scale, step)
@@ -134,11 +141,7 @@ def _sense(x: Any, f: Any, dT: Any, matrix: Any, G: Any, by_temperature: Any, as
         for j in range(3):
             changes |= G[i, j] != 0.0
     if not changes:
-        for k in range(len(x)):
-            a, b, c = x[k, 0], x[k, 1], x[k, 2]
-            out[k, 0] = a + matrix[0, 0] * a + matrix[0, 1] * b + matrix[0, 2] * c
-            out[k, 1] = b + matrix[1, 0] * a + matrix[1, 1] * b + matrix[1, 2] * c
-            out[k, 2] = c + matrix[2, 0] * a + matrix[2, 1] * b + matrix[2, 2] * c
+        sense(x, matrix, out)
         return
     for k in range(len(x)):
         for i in range(3):

@@ -7,12 +7,13 @@ makes a number of 98.8 % of them by one product; the others take the long way.
 Sources: M. O'Neill, "PCG: a family of simple fast space-efficient statistically good algorithms for random number generation",
 HMC-CS-2014-0905 (2014), XSL-RR 128/64; F. Brown, "Random number generation with arbitrary strides", Trans. Am. Nucl. Soc. 71
 (1994); G. Marsaglia and W. Tsang, "The ziggurat method for generating random variables", J. Stat. Softw. 5(8) (2000), in the
-layers and the order of draws of NumPy.
+layers and the order of draws of NumPy; M. O'Neill, "Developing a seed_seq alternative" (2015), for the first state.
 """
 
 from __future__ import annotations
 
 from functools import cache
+from operator import index
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645
 MODULUS = 1 << 128
 SIGNED = 512  # layers of the ziggurat, with the sign as the ninth bit
 TO_ONE = 2.0**-53
+# Of NumPy's SeedSequence: first hash and factor of what goes in and of what comes out, and the factors by which words are mixed.
+INTO, INTO_BY, OUT, OUT_BY, LEFT, RIGHT = 0x43B0D7E5, 0x931E8875, 0x8B51F9DD, 0x58F38DED, 0xCA01F9DD, 0x4973F715
+POOL = 4  # words
 
 
 class Normals(NamedTuple):
@@ -73,6 +77,36 @@ def normals_of(rng: np.random.Generator) -> Normals:
     return Normals(state, factors, np.empty(BLOCK, dtype=np.uint64), np.array([BLOCK, 0]), scale, most, height, tail)
 
 
+def normals_at(seed: int, *key: int) -> Normals:
+    """The numbers of :func:`truenorth.simulation.streams.stream`, which takes five times as long to begin."""
+    words = _words_of(seed)
+    words += [0] * (POOL - len(words))
+    for number in key:
+        words += _words_of(number)
+    ahead, scale, most, height, tail = _tables()
+    state, factors = np.empty(2, dtype=np.uint64), np.empty((4, BLOCK + 1), dtype=np.uint64)
+    _start(np.array(words, dtype=np.uint64), ahead, state, factors)
+    return Normals(state, factors, np.empty(BLOCK, dtype=np.uint64), np.array([BLOCK, 0]), scale, most, height, tail)
+
+
+def first_normals(shape: tuple[int, ...], seed: int, *key: int) -> NDArray[np.float64]:
+    """The first numbers of a stream, as many as an array of this shape holds."""
+    found = np.empty(shape)
+    draw(normals_at(seed, *key), found.reshape(-1))
+    return found
+
+
+def _words_of(number: int) -> list[int]:
+    """Of 32 bits each, the lowest first."""
+    left = index(number)
+    if left < 0:
+        raise ValueError(f"seed or number of a stream {number}; expected none that is negative")
+    words = [left & 0xFFFFFFFF]
+    while left := left >> 32:
+        words.append(left & 0xFFFFFFFF)
+    return words
+
+
 def _halves(x: int) -> Words:
     return np.array(divmod(x, 1 << 64), dtype=np.uint64)
 
@@ -94,6 +128,45 @@ def _tables() -> tuple[Words, NDArray[np.float64], NDArray[np.int64], NDArray[np
     most = np.concatenate([tables.ki_double, tables.ki_double]).astype(np.int64)
     tail = np.array([tables.ziggurat_nor_r, tables.ziggurat_nor_inv_r])
     return ahead, scale, most, np.array(tables.fi_double), tail
+
+
+@compiled
+def _start(words: Any, ahead: Any, state: Any, factors: Any) -> None:
+    """State at the first word and factors, from words of 32 bits: NumPy's ``PCG64(SeedSequence(..))`` behind its first step."""
+    half, quarter, by = np.uint64(16), np.uint64(0xFFFFFFFF), np.uint64(INTO)
+    pool = np.zeros(POOL, dtype=np.uint64)
+    for i in range(POOL):
+        pool[i], by = _hashed(words[i], by, np.uint64(INTO_BY))
+    for i in range(len(words)):
+        for j in range(POOL):
+            if i != j:
+                word, by = _hashed(pool[i] if i < POOL else words[i], by, np.uint64(INTO_BY))
+                mixed = (np.uint64(LEFT) * pool[j] - np.uint64(RIGHT) * word) & quarter
+                pool[j] = mixed ^ (mixed >> half)
+    by, given = np.uint64(OUT), np.zeros(POOL, dtype=np.uint64)
+    for i in range(2 * POOL):
+        word, by = _hashed(pool[i % POOL], by, np.uint64(OUT_BY))
+        given[i // 2] |= word << np.uint64(32 * (i % 2))
+    increment = np.empty(2, dtype=np.uint64)
+    increment[0] = (given[2] << np.uint64(1)) | (given[3] >> np.uint64(63))
+    increment[1] = (given[3] << np.uint64(1)) | np.uint64(1)
+    for k in range(BLOCK + 1):
+        factors[0, k], factors[1, k] = ahead[0, k], ahead[1, k]
+    _begin(increment, factors)
+    low = given[1] + increment[1]
+    high = given[0] + increment[0] + np.uint64(low < increment[1])
+    for _ in range(2):
+        high, low = _go_on(high, low, factors[0, 1], factors[1, 1], increment[0], increment[1])
+    state[0], state[1] = high, low
+
+
+@borrowing(forceinline=True)
+def _hashed(word: Any, by: Any, factor: Any) -> Any:
+    """A word that is hashed, and the hash of the next one."""
+    quarter = np.uint64(0xFFFFFFFF)
+    following = (by * factor) & quarter
+    found = ((word ^ by) * following) & quarter
+    return found ^ (found >> np.uint64(16)), following
 
 
 @compiled

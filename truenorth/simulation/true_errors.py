@@ -25,7 +25,8 @@ from truenorth.core.yaml_file import quantity, unknown_key
 from truenorth.records.spec_keys import KEYS
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation.drift import Wander
-from truenorth.simulation.streams import STREAMS, stream
+from truenorth.simulation.normals import first_normals
+from truenorth.simulation.streams import STREAMS
 
 Array = NDArray[np.float64]
 SHAPES: dict[str, tuple[int, ...]] = {
@@ -77,6 +78,12 @@ class SensorErrors:
     def constant_bias(self) -> Array:
         """(3,) all of the bias that does not change in a run."""
         return self.bias + self.turn_on_bias
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether a sensor is a matrix and a bias: neither temperature nor sign nor, of a gyro, force changes what it gives."""
+        others = self.scale_factor_temperature, self.scale_factor_asymmetry, self.g_sensitivity
+        return not any(term.any() for term in others)
 
     @property
     def matrix(self) -> Array:
@@ -152,7 +159,7 @@ def drawn_errors(
             return values[name]
         if sigma == 0.0:
             return np.zeros(shape)
-        draw: Array = sigma * stream(seed, scenario, run, STREAMS[name]).standard_normal(shape)
+        draw: Array = sigma * first_normals(shape, seed, scenario, run, STREAMS[name])
         return draw - np.diag(np.diag(draw)) if term == "misalignment" else draw
 
     def drawn_of(group: str) -> SensorErrors:
