@@ -83,7 +83,7 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = F
     if sways:
         covariance = covariance + creep(task, fine.integrals.time[1:])
     e = fine.estimates
-    bias, variance = fine.nominal_bias + e.x[:, BIASES], np.einsum("kii->ki", e.P[:, BA, BA])
+    bias, variance = fine.taken[BIASES] + e.x[:, BIASES], np.einsum("kii->ki", e.P[:, BA, BA])
     prior = np.diag(fine.system.P0)[BA]
     accel_bias, accel_sigma = true_bias(bias[:, 3:], variance, prior, used.bias_variance[3:])
     return History(

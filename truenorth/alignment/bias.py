@@ -56,5 +56,7 @@ def true_bias(total: Array, variance: Array, prior: Array, proper: Array) -> tup
     -------
     bias, sigma : (..., 3) arrays
     """
-    share = np.divide(proper, prior, out=np.zeros_like(prior), where=prior > 0.0)  # no bias at all has none that is proper
+    share = np.divide(
+        proper, prior, out=np.zeros_like(prior), where=prior > 0.0
+    )  # no bias at all has none that is proper
     return share * total, np.sqrt(share * (prior - proper) + share**2 * variance)

@@ -149,13 +149,30 @@ def fit_task_noise(
     return fit_noise(build, R, wandering_as_usual(fit_noise(build, R, usual)), climb=True)
 
 
-def sharper(filtered: LogCheck, mean: LogCheck, motion: MotionSummary) -> LogCheck:
+def force_size(task: Task) -> tuple[float, float]:
+    """By how much the specific force is larger than gravity in the mean, whatever the attitude, and its noise, m/s^2."""
+    record = task.record
+    size = np.linalg.norm(record.accel, axis=1) / (record.interval if record.kind == "increments" else 1.0)
+    seconds = max(len(size) // max(round(1.0 / record.interval), 1), 1)
+    means = np.array(
+        [part.mean() for part in np.array_split(size, seconds)]
+    )  # of a force that turns the mean is smaller
+    return float(means.mean()) - task.gravity, float(means.std()) / math.sqrt(seconds)
+
+
+def sharper(filtered: LogCheck, mean: LogCheck, task: Task) -> LogCheck:
     """The filter's check, with those rates taken from the means that tell them better.
 
     A filter that knows only that the base goes nowhere sees the vertical gyro bias badly; on a base that does not turn
     either, the mean rate shows it at once. (On a swaying base coning gives the mean rate an offset, and it is not asked.)
+
+    A filter that knows no scale factors carries no attitude through an IMU that turns on and on: what is up for it is not. There
+    the size of the force is asked.
     """
-    if motion.overall not in ("still", "disturbed"):
+    if task.motion.fraction("rotating") > 0.0:
+        residual, noise = force_size(task)
+        return replace(filtered, force_residual=residual, force_noise=noise, force_dof=math.inf)
+    if task.motion.overall not in ("still", "disturbed"):
         return filtered
     better = mean.rate_noise < filtered.rate_noise
     return replace(

@@ -59,7 +59,9 @@ class FineAlignment(Filtered):
 
     integrals: InertialIntegrals
     C_n0_i: Array  # (3, 3): nominal attitude of the last pass; states are errors of it
-    nominal_bias: Array  # (6,): gyro and accelerometer biases taken off before the last pass
+    taken: (
+        Array  # (n,): errors of the sensors (and the arm) taken off before the last pass; zero of attitude and velocity
+    )
     gains: Gains  # that the filter used
     # (n, n): the part of the last covariance that the biases alone make, ``P = floor + random``: what waiting does not improve
     floor: Array
@@ -83,7 +85,7 @@ class FineAlignment(Filtered):
         return cls(
             integrals=log.integrals,
             C_n0_i=log.C_n0_i,
-            nominal_bias=log.bias,
+            taken=log.taken,
             system=system,
             estimates=estimates,
             gains=gains,
@@ -99,7 +101,13 @@ class FineAlignment(Filtered):
     @property
     def bias(self) -> Array:
         """(6,) gyro and accelerometer bias at the last epoch."""
-        return self.nominal_bias + self.end[BIASES]
+        return np.asarray(self.taken[BIASES] + self.end[BIASES])
+
+    @property
+    def mean_rate(self) -> Array:
+        """(3, n) mean rate of the base in ``n0`` that an error of each state makes, rad/s by its unit."""
+        J = self._carried_to(0.0)[PHI] / self.integrals.time[-1]
+        return np.where(np.arange(J.shape[1]) < BG.start, 0.0, J)
 
     def misalignment_at(self, C_ib: Array, time: float) -> tuple[Array, Array, Array]:
         """Attitude, misalignment covariance and its floor at any time of the log (smoothed to the end of the data).

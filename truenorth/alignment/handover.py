@@ -56,7 +56,7 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         interval=task.interval,
         form=fine.form,
         C_n0_i=fine.C_n0_i,
-        bias=fine.nominal_bias,
+        bias=fine.taken[BIASES],
         R=fine.disturbance**2,
         arm=fine.arm - fine.end[STATES : STATES + 3] if isinstance(fine, SwayAlignment) else None,
         motion=fine.motion if isinstance(fine, SwayAlignment) else (),

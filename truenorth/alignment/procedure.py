@@ -34,6 +34,7 @@ from truenorth.alignment.published import FADING, STATIONARY, Published, factor_
 from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.rivals import rival_evidence
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.sway_inference import sway_inferred
@@ -220,7 +221,7 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
     if overall == "rotating":
         why += POSITIONS
-    # A table that turns an IMU does not rock with it: a motion fitted at the rate of its turn hides what the sensors are off by.
+    # A table does not rock.
     if task.record.duration < SHORTEST_SWAYING or not (overall in words or rocks_all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
@@ -274,7 +275,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogChe
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
     known = StaticModel.of(spec) if spec is not None else usual if brief else None
     filtered, noise = check_filter(task, integrals, coarse.C_n0_i, usual, known)
-    check = sharper(filtered, means, task.motion)
+    check = sharper(filtered, means, task)
     turns = task.motion.fraction("rotating") > 0.0
     used, where = specification(spec, check, lambda: turning_noise(task.record) if turns else noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
@@ -331,7 +332,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogChe
         biased = swung_biases(fine, np.sqrt(used.bias_variance[3:]), task.position)
         others = biased if others is None else np.concatenate([others, biased], axis=2)
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None, sways=swung)
-    steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
+    steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere + rival_evidence(fine, lat)
     heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
@@ -339,8 +340,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogChe
         steps += late_gyro_evidence(fine, task.record, anew) + scale_on_sway_evidence(fine, task.record, anew)
         steps += gyro_matrix_evidence(fine, task.record, used, anew, steps)
     way = farthest(fine, task.position) if swung else math.inf
-    left = _moves_on(task, fine) if swung else None
-    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, left)
+    moved = _moves_on(task, fine) if swung else None
+    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, moved)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:

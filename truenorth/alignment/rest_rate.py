@@ -43,7 +43,7 @@ def rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
     integrals = integrate(rest.record, rest.interval)
     coarse = oba(integrals, lat, task.position.alt, history=False)
     filtered, _ = check_filter(rest, integrals, coarse.C_n0_i, noise, noise)
-    check = sharper(filtered, check_means(rest.means, lat, rest.gravity), rest.motion)
+    check = sharper(filtered, check_means(rest.means, lat, rest.gravity), rest)
     bias = float(np.sqrt(task.spec.bias_variance[0]))
     return rate_evidence(check, bias, lat, f"specification {task.spec.name!r}", heading_by_biases(task, track))
 

@@ -31,6 +31,7 @@ from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.rivals import rival_evidence
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align, swinging, usual_sway
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
@@ -218,6 +219,7 @@ def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task
     evidence += base_speed(answer) + steps + bad_stretches(fine, task.record) + hemisphere
     if isinstance(fine, SwayAlignment):
         evidence += late_gyros_evidence(fine, fine.late, task.record) + accel_scale_evidence(fine, spec)
+        evidence += rival_evidence(fine, task.position.lat)
     return evidence
 
 

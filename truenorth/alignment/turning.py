@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.check import BLIND_RATE, LogCheck
+from truenorth.alignment.check import BLIND_RATE, LogCheck, force_size
 from truenorth.alignment.fine import ARM_PRIOR, MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import infer_spec
 from truenorth.alignment.swaying import farthest
@@ -117,9 +117,7 @@ def rocks_all_along(motion: MotionSummary) -> bool:
 def infer_turning(task: Task) -> ImuSpec:
     """Specification of an IMU that turns: by its noise, by gravity, whose size shows at any attitude, and by its level rates."""
     noise = turning_noise(task.record)
-    size = np.linalg.norm(task.motion.specific_force, axis=1)
-    force = float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size))
-    return with_usual(infer_spec(LogCheck(*_level_rates(task, noise), *force), noise))
+    return with_usual(infer_spec(LogCheck(*_level_rates(task, noise), *force_size(task)), noise))
 
 
 def _level_rates(task: Task, noise: StaticModel) -> tuple[Array, Array]:
