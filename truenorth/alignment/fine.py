@@ -103,12 +103,6 @@ class FineAlignment(Filtered):
         """(6,) gyro and accelerometer bias at the last epoch."""
         return np.asarray(self.taken[BIASES] + self.end[BIASES])
 
-    @property
-    def mean_rate(self) -> Array:
-        """(3, n) mean rate of the base in ``n0`` that an error of each state makes, rad/s by its unit."""
-        J = self._carried_to(0.0)[PHI] / self.integrals.time[-1]
-        return np.where(np.arange(J.shape[1]) < BG.start, 0.0, J)
-
     def misalignment_at(self, C_ib: Array, time: float) -> tuple[Array, Array, Array]:
         """Attitude, misalignment covariance and its floor at any time of the log (smoothed to the end of the data).
 
