@@ -101,6 +101,12 @@ def test_an_imu_without_any_bias_has_an_answer_that_is_a_number(kind):
     assert np.isfinite(answer.phi_covariance).all()
 
 
+def test_an_odometer_s_gyros_without_any_bias_leave_heading_no_part_by_them():
+    inputs, _ = BENCHES["odometer"].draw(5, 0)
+    answer = BENCHES["odometer"].align(inputs | {"imu": noise_of(inputs["imu"]) | {"unnamed": "zero"}})
+    assert np.isfinite(answer.phi_covariance).all()
+
+
 def test_what_is_named_stays():
     spec = imu_spec({"gyro": NOISE["gyro"] | {"bias": "0 deg/h"}, "accel": NOISE["accel"] | {"turn_on_bias": "2 mg"}})
     assert not {"gyro_bias", "accel_bias"} & set(spec.unsaid)

@@ -56,4 +56,5 @@ def heading_by_biases(task: MovingTask, track: Track) -> float:
     nothing.
     """
     covariance = fifteen(track)[-1, PHI, BG][2]
-    return float(np.linalg.norm(covariance / np.sqrt(task.spec.bias_variance[:3])))
+    sigma = np.sqrt(task.spec.bias_variance[:3])
+    return float(np.linalg.norm(covariance[sigma > 0.0] / sigma[sigma > 0.0]))
