@@ -12,9 +12,9 @@ from truenorth.simulation.scenario import read_scenario
 NORTH = 337.188  # deg: 23 deg to one side of the axis, which points east of it
 
 
-def answered(imu, heading, *, encoder, seed=901, rate="15 deg/s", duration="600 s"):
-    """An IMU whose outer axis, along x, turns on and on; and by how much the answer is off, over sigma."""
-    axes = [{"kind": "spin", "direction": "x", "rate": rate}]
+def answered(imu, heading, *, encoder, axis="x", rate="15 deg/s", duration="600 s", seed=901, disturbances=()):
+    """An IMU whose outer axis turns on and on; and by how much the answer is off, over sigma."""
+    axes = [{"kind": "spin", "direction": axis, "rate": rate}]
     axes += [{"kind": "spin", "direction": "z", "rate": "6 deg/s"}] if encoder else []
     scenario = read_scenario(
         {
@@ -23,6 +23,7 @@ def answered(imu, heading, *, encoder, seed=901, rate="15 deg/s", duration="600 
             "position": {"lat": "45.3157 deg", "lon": "10 deg"},
             "motion": {"kind": "rest", "heading": f"{heading} deg", "pitch": "-0.889 deg", "roll": "2.125 deg"},
             "imu": imu,
+            "disturbances": list(disturbances),
             "indexer": {"axes": axes} | ({"encoder": {"resolution": "1 arcsec"}} if encoder else {}),
         }
     )
@@ -62,3 +63,22 @@ def test_an_imu_that_tumbles_without_an_encoder(imu):
     assert has_rival(answer) == (imu == "tactical")
     assert answer.status == ("aligned" if imu == "navigation" else "not_converged"), answer.reasons
     assert np.abs(off).max() < 4.0
+
+
+@pytest.mark.parametrize(("rate", "duration"), [("3 deg/s", "120 s"), ("12 deg/s", "45 s")])
+def test_one_turn_about_the_vertical_leaves_one_heading(rate, duration):
+    """A misalignment makes a tilt that goes round with the IMU once: its mean over the log was taken for a rate."""
+    answer, off = answered("tactical", 40.0, encoder=False, axis="z", rate=rate, duration=duration)
+    assert not has_rival(answer)
+    assert answer.status == "aligned", answer.reasons
+    assert np.abs(off).max() < 4.0
+
+
+def test_vibration_of_an_imu_that_turns_is_no_bias():
+    """The size of each row's force has the square of what is across gravity in it: 4 mg of .1 g, and a sound log was refused."""
+    shakes = [{"kind": "vibration", "sines": [{"frequency": "28 Hz", "acceleration": ["0.1 g", "0.1 g", "0.1 g"]}]}]
+    answer, off = answered(
+        "navigation", 40.0, encoder=False, axis="z", rate="12 deg/s", duration="150 s", disturbances=shakes
+    )
+    assert answer.status == "aligned", answer.reasons
+    assert np.abs(off[:2]).max() < 4.0

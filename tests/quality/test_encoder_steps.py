@@ -92,3 +92,10 @@ def test_an_indexer_that_spins_with_a_fine_encoder_keeps_its_sigma():
     carried = carried_angles(inputs["encoder"], inputs["record"], ("z", "x"))
     end = float(inputs["encoder"].time[-1])
     assert carried.sigma(end) < 2.0 * max(carried.noise, ROUNDED * np.radians(1.0) / 3600.0)
+
+
+@pytest.mark.parametrize("rows", [2, 4, 5, 8, 10])
+def test_few_rows_show_no_step(rows):
+    """An encoder's log of ten rows ended in an error of NumPy."""
+    angles = 0.1 * np.arange(rows)[:, None]
+    assert resolution(angles, np.zeros((rows, 1))) == [0.0]

@@ -27,7 +27,7 @@ from truenorth.estimate.base_motion import white_variance
 from truenorth.filters import LinearSystem
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records.specs import ImuSpec
-from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
 
@@ -151,13 +151,10 @@ def fit_task_noise(
 
 def force_size(task: Task) -> tuple[float, float]:
     """By how much the specific force is larger than gravity in the mean, whatever the attitude, and its noise, m/s^2."""
-    record = task.record
-    size = np.linalg.norm(record.accel, axis=1) / (record.interval if record.kind == "increments" else 1.0)
-    seconds = max(len(size) // max(round(1.0 / record.interval), 1), 1)
-    means = np.array(
-        [part.mean() for part in np.array_split(size, seconds)]
-    )  # of a force that turns the mean is smaller
-    return float(means.mean()) - task.gravity, float(means.std()) / math.sqrt(seconds)
+    size = np.linalg.norm(
+        integrate(task.record, task.interval).mean_force, axis=1
+    )  # a turn and a vibration average out
+    return float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size))
 
 
 def sharper(filtered: LogCheck, mean: LogCheck, task: Task) -> LogCheck:

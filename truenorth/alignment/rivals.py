@@ -8,10 +8,9 @@ that is linear about its own.
 
 With J the mean level rate that each scale factor and misalignment makes, P their covariance before the log and e what was found of
 them, the rate that a heading off by d asks of them is ``J e + w - R(d) w``, and its likelihood before the log is that of a normal
-distribution with ``J P J' `` and what the log does not know. The mean is weighted by Hann's window, and counts as far as the turn
-goes on all along: what goes round with the IMU makes a tilt that goes round, a turn of seconds makes one that stays, and neither a
-rate. Biases are left out: where they may be as large as the earth's rate fits begin at headings all round
-(:mod:`~truenorth.alignment.rotary`).
+distribution with ``J P J' `` and what the log does not know. Of J what goes on in every part of the log counts: what goes round
+with the IMU makes a tilt that goes round, a turn of seconds makes one that stays, and neither a rate. Biases are left out: where
+they may be as large as the earth's rate fits begin at headings all round (:mod:`~truenorth.alignment.rotary`).
 """
 
 from __future__ import annotations
@@ -19,21 +18,23 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
-from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.matrices import MATRICES
 from truenorth.errors.staying import PHI, STATES
 from truenorth.state.evidence import Effect, Evidence
 
+Array = NDArray[np.float64]
+
 TRIED = np.radians(np.arange(0.5, 360.0, 0.5))  # by which a heading is off
 LIKELY = 16.0  # twice the logarithm of a likelihood ratio: four sigmas of what makes up for it
-NEAR, SIGMAS = (
-    math.radians(20.0),
-    10.0,
-)  # what is nearer, with nothing less likely between, is the same heading, and in sigma
-PARTS = 4  # of a log, in each of which a steady turn goes on
+NEAR = math.radians(
+    20.0
+)  # what is nearer, or by fewer sigmas, with nothing less likely between, is the same heading, and in sigma
+SIGMAS = 10.0
+PARTS = 4  # of a log, in each of which a steady rate goes on
 
 
 def rival_evidence(fine: FineAlignment, lat: float) -> list[Evidence]:
@@ -52,11 +53,7 @@ def rival_evidence(fine: FineAlignment, lat: float) -> list[Evidence]:
 def rival_heading(fine: FineAlignment, lat: float) -> float:
     """How far the farthest heading is that is about as likely as the one that was found, rad; zero where there is none."""
     matrices = slice(STATES, STATES + MATRICES)
-    times = fine.integrals.intervals
-    middle = (fine.integrals.time[1:] - 0.5 * times) / fine.integrals.time[-1]
-    window = np.sin(math.pi * middle) ** 2
-    J = -np.einsum("k,kij->ij", window, fine.system.Phi[:, PHI, matrices])[:2] / float(window @ times)
-    J *= _steadiness(fine)
+    J = _steady(-fine.system.Phi[:, PHI, matrices][:, :2] / fine.integrals.intervals[:, None, None])
     rate = EARTH_RATE * math.cos(lat)
     unknown = rate**2 * fine.P[PHI, PHI][2, 2]
     S = J @ fine.system.P0[matrices, matrices] @ J.T + unknown * np.eye(2)
@@ -71,10 +68,9 @@ def rival_heading(fine: FineAlignment, lat: float) -> float:
     return float(off[rivals].max(initial=0.0))
 
 
-def _steadiness(fine: FineAlignment) -> float:
-    """How much of the mean level turn goes on in every part of a log, 0 to 1: a turn of seconds makes a tilt, and no rate."""
-    C_ib = fine.integrals.C_ib
-    turns = rotation_vector_from_dcm(C_ib[1:] @ np.swapaxes(C_ib[:-1], 1, 2)) @ fine.C_n0_i.T
-    parts = np.array([part.sum(axis=0)[:2] for part in np.array_split(turns, PARTS)]) / len(turns) * PARTS
+def _steady(rates: Array) -> Array:
+    """(2, n) of rates (K, 2, n) what goes on in every part of a log: of what goes round, or turns for seconds, next to nothing."""
+    parts = np.array([part.mean(axis=0) for part in np.array_split(rates, PARTS)])
     mean = parts.mean(axis=0)
-    return float(np.clip((parts @ mean).min() / max(float(mean @ mean), 1e-300), 0.0, 1.0))
+    share = (parts * np.sign(mean)).min(axis=0) / np.maximum(np.abs(mean), 1e-300)
+    return np.asarray(mean * np.clip(share, 0.0, 1.0))

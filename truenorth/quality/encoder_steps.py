@@ -48,9 +48,11 @@ def resolution(angles: Array, turned: Array) -> Array:
 def _step(angle: Array, turned: Array) -> float:
     gaps = np.diff(np.unique(angle))
     gaps = np.sort(gaps[gaps > SAME * float(np.ptp(angle))])
-    if not gaps.size:
+    if not gaps.size or len(angle) <= NEAR + max(ORDERS):
         return 0.0
     step, exactly = _whole(gaps)
+    if not step:
+        return 0.0
     goes = np.abs(np.diff(angle))
     many = exactly and float(np.median(goes[goes > 0.5 * step])) > 1.5 * step
     return step if many or _scatter(angle, turned, step) > SHOWN * ROUNDED * step else 0.0

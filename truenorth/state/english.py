@@ -17,8 +17,8 @@ SENTENCES = {
     "heading.paid": "after {pays_until:.0f} s more time stopped paying: the floor was the larger part",
     "heading.pays": "more time pays until about {pays_until:.0f} s; the log has {duration:.0f} s",
     "heading.rivals": (
-        "a heading {off:deg|.0f} deg away explains the log as well: the indexer turns on and on one way about a level axis, and a "
-        "scale factor of the gyro along it makes up for the difference; let it turn both ways, or tilt the axis"
+        "a heading {off:deg|.0f} deg away explains the log as well: the IMU is turned on and on one way about an axis that is not "
+        "vertical, and a scale factor of the gyro along it makes up for the difference; turn it both ways in turn"
     ),
     "heading.vertical": "pitch is near ±90 deg: only a combination of heading and roll is known (see the combination)",
     "level.upside_down": (
