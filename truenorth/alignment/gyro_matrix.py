@@ -53,6 +53,7 @@ OPEN = (0.01, 0.05)  # of a turn, one sigma of each entry where the matrix is le
 LARGEST = 0.2  # entry of a step
 # Of a turn: true ones were found to .03 deg. A sound ship that rolls by 18 deg with an arm of 14 m shows .008 deg, by what
 # her filter leaves out: less than this is in sigma, and refuses no log.
+SHOWN = 4.0  # sigmas of a turn, about three axes: a sound log in a thousand has more
 EXACT = 5e-4
 ONE = np.eye(3, dtype=np.bool_)
 LATE = ("response.gyros_late", "response.gyros_early", "response.gyro_late")
@@ -104,7 +105,8 @@ def gyro_matrix_evidence(
         return []
     moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, found.fine))))
     key, figures = _named(found.M, found.sigma)
-    askew = _askew(fine, found.M) if key == "tilt.turned" else 0.0
+    turned = key == "tilt.turned" and float(figures["turn"]) > SHOWN * float(figures["sigma"])
+    askew = _askew(fine, found.M) if turned else 0.0
     if not np.any(np.append(moved, askew) > limit("negligible") * np.sqrt(np.diag(fine.P)[PHI])[[0, 1, 2, 0]]):
         return []
     effect = Effect(heading=float(moved[2]), level=math.hypot(moved[0], moved[1], askew))
