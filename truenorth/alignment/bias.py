@@ -56,7 +56,6 @@ def true_bias(total: Array, variance: Array, prior: Array, proper: Array) -> tup
     -------
     bias, sigma : (..., 3) arrays
     """
-    share = np.divide(
-        proper, prior, out=np.zeros_like(prior), where=prior > 0.0
-    )  # no bias at all has none that is proper
+    # Of no bias at all none is proper.
+    share = np.divide(proper, prior, out=np.zeros_like(prior), where=prior > 0.0)
     return share * total, np.sqrt(share * (prior - proper) + share**2 * variance)

@@ -151,9 +151,8 @@ def fit_task_noise(
 
 def force_size(task: Task) -> tuple[float, float]:
     """By how much the specific force is larger than gravity in the mean, whatever the attitude, and its noise, m/s^2."""
-    size = np.linalg.norm(
-        integrate(task.record, task.interval).mean_force, axis=1
-    )  # a turn and a vibration average out
+    # By intervals, in the inertial frame: turns are taken off, and a vibration averages out.
+    size = np.linalg.norm(integrate(task.record, task.interval).mean_force, axis=1)
     return float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size))
 
 

@@ -73,9 +73,8 @@ class CarriedAngles:
         """
         beyond = max(time - self.last, 0.0)
         rows = beyond / self.step * np.array([11.0 / 6.0, -3.0, 1.5, -1.0 / 3.0]) + (1.0, 0.0, 0.0, 0.0)
-        part = math.sqrt(
-            max((ROUNDED * float(self.steps.max(initial=0.0))) ** 2 - self.noise**2, 0.0)
-        )  # noise has the rest of it
+        rounded = ROUNDED * float(self.steps.max(initial=0.0))
+        part = math.sqrt(max(rounded**2 - self.noise**2, 0.0))  # noise has the rest of it
         return math.hypot(self.noise * float(np.linalg.norm(rows)), part, 0.5 * self.swing * beyond**2)
 
 

@@ -59,9 +59,8 @@ class FineAlignment(Filtered):
 
     integrals: InertialIntegrals
     C_n0_i: Array  # (3, 3): nominal attitude of the last pass; states are errors of it
-    taken: (
-        Array  # (n,): errors of the sensors (and the arm) taken off before the last pass; zero of attitude and velocity
-    )
+    # (n,): errors of the sensors (and the arm) taken off before the last pass; zero of attitude and velocity
+    taken: Array
     gains: Gains  # that the filter used
     # (n, n): the part of the last covariance that the biases alone make, ``P = floor + random``: what waiting does not improve
     floor: Array

@@ -30,10 +30,8 @@ Array = NDArray[np.float64]
 
 TRIED = np.radians(np.arange(0.5, 360.0, 0.5))  # by which a heading is off
 LIKELY = 16.0  # twice the logarithm of a likelihood ratio: four sigmas of what makes up for it
-NEAR = math.radians(
-    20.0
-)  # what is nearer, or by fewer sigmas, with nothing less likely between, is the same heading, and in sigma
-SIGMAS = 10.0
+# What is nearer than one of these two, with nothing less likely between, is the same heading, and in sigma.
+NEAR, SIGMAS = math.radians(20.0), 10.0
 PARTS = 4  # of a log, in each of which a steady rate goes on
 
 
