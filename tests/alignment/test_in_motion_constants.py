@@ -10,6 +10,7 @@ from benchmarks.honesty import moving
 from benchmarks.honesty.harness import Log, simulated
 from tests.alignment.test_in_motion_learnt import track_of
 from truenorth.alignment import in_motion
+from truenorth.alignment.in_motion_untold import fits_worse
 from truenorth.errors.group import Group
 from truenorth.quality.slow_aids import FIXES, LEAST, SPEEDS, Lasting
 
@@ -100,9 +101,9 @@ def test_the_log_decides():
     rng = np.random.default_rng(SEED)
     innovation = rng.standard_normal((400, 3))
     right = track_of(innovation, np.ones((400, 3)))
-    assert not in_motion._fits_worse(right, track_of(1.002 * innovation, np.ones((400, 3))))
-    assert in_motion._fits_worse(right, track_of(1.1 * innovation, np.ones((400, 3))))
+    assert not fits_worse(right, track_of(1.002 * innovation, np.ones((400, 3))))
+    assert fits_worse(right, track_of(1.1 * innovation, np.ones((400, 3))))
     (residuals,) = right.residuals
     used = residuals.used.copy()
     used[7] = False
-    assert in_motion._fits_worse(right, replace(right, residuals=(replace(residuals, used=used),)))
+    assert fits_worse(right, replace(right, residuals=(replace(residuals, used=used),)))

@@ -21,13 +21,13 @@ from truenorth.alignment.in_motion_axes import half_turn_evidence
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
-from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
 from truenorth.alignment.in_motion_moments import two_moments, with_swing_apart
 from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
+from truenorth.alignment.in_motion_untold import UNTOLD, by_gravity, fits_worse, hidden_from, with_heading_held
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
@@ -43,7 +43,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.estimate.poorer import ALONE, BIASES, poorer_evidence, poorer_rivals, poorer_tracks
-from truenorth.estimate.rivals import Rival, jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
+from truenorth.estimate.rivals import Rival, jump_evidence, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.aid_noise import LOUD, noise_factors
@@ -55,7 +55,6 @@ from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import DP, PHI
-from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -218,8 +217,12 @@ def _aligned(
         last = open_track(task, first, track)
     if last is not None:
         spread = bank.beyond(SURELY * float(last.sigma[-1, PHI][2]))
+    elif method == "motion" and passes > 1 and hidden_from(task):
+        tell(f"pass {number + 1}")
+        if (held := with_heading_held(task, found, first)) is not None:
+            guess, track, spread = held[0].guess, held[0].track, held[1]
     elif method == "motion" and spread.and_more(found.sigma).heading > UNTOLD:
-        task, guess, track = _by_gravity(task, guess, track, first)
+        task, guess, track = by_gravity(task, found, first)
     answer = moving_answer(task, task.with_lasting_fixes(last or track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
@@ -266,28 +269,9 @@ def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTa
             other = once_more(constant, other, first)
         except DataError:  # the filter broke down: they are not
             return task, found
-        if _fits_worse(found.track, other.track):
+        if fits_worse(found.track, other.track):
             return task, found
     return constant, other
-
-
-def _by_gravity(task: MovingTask, guess: Guess, track: Track, first: Guess) -> tuple[MovingTask, Guess, Track]:
-    """Task, guess and track of a pass that takes no tilt for a bias; the same ones where the log speaks against it."""
-    held = task.with_level_biases_held()
-    try:
-        last = once_more(held, begun(held, first, held.run(first, gated=False)), first)
-        other = with_level_biases(task, last.track)
-    except DataError:  # the filter broke down
-        return task, guess, track
-    return (task, guess, track) if _fits_worse(track, other) else (held, last.guess, other)
-
-
-def _fits_worse(track: Track, other: Track) -> bool:
-    """Whether the log speaks for the first of two tracks by more than chance does, or the other rejects more of it."""
-    rejected = sum(
-        int(np.sum(b.used)) < int(np.sum(a.used)) for a, b in zip(track.residuals, other.residuals, strict=True)
-    )
-    return rejected > 0 or likelihood_ratio(other.residuals, track.residuals) > limit("rival")
 
 
 def _seen(

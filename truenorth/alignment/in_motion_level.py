@@ -10,7 +10,6 @@ Where the log speaks against it, since the vehicle has turned, it is not taken.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +23,6 @@ from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-UNTOLD = math.radians(20.0)  # one sigma of heading: products of it with a tilt are no small part of the tilt
 TILTS = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # phi by biases along east, north, up, by g
 
 

@@ -1,0 +1,119 @@
+"""Level of a vehicle whose heading its log does not tell: passes that hold a heading, and others all round that fit as well.
+
+With velocities in body axes alone (an odometer, a Doppler log) nothing but the earth's rate tells heading. Where the gyros hide
+that, any heading is as good as another, and so is the level that goes with it. A filter that may correct its heading does not
+know that: with each correction the columns of biases, which are fixed to the body, turn against those of tilts, which are not, and
+that passes for knowledge of both. A consumer IMU that drove S-turns knew its level to .3 deg and was up to ten of these off.
+
+So the heading is held: it is where north shall be, not an error. A pass so held finds level and biases as the turns between them
+tell, and the passes go on until the level that the next begins with is the one that it leads back to. What the earth's rate does
+tell of heading, and what a wrong one does to level, is then read from passes held at headings all round (ours).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from truenorth.alignment.in_motion_level import with_level_biases
+from truenorth.alignment.in_motion_passes import Pass, begun, once_more
+from truenorth.alignment.in_motion_spread import Spread
+from truenorth.alignment.in_motion_start import HEADINGS, Guess, led_back
+from truenorth.alignment.in_motion_task import MovingTask
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.earth import EARTH_RATE
+from truenorth.core.errors import DataError
+from truenorth.estimate.rivals import likelihood_ratio, misfit
+from truenorth.state.layout import PHI
+from truenorth.state.limits import limit
+from truenorth.state.track import Track
+
+UNTOLD = math.radians(20.0)  # one sigma of heading: products of it with a tilt are no small part of the tilt
+HELD = math.radians(0.1)  # one sigma of a heading that is held: it moves by less than errors of second order
+SETTLED = 0.1  # of its sigma, by which the level of the next pass may still differ
+MOST = 12  # passes
+
+
+def hidden_from(task: MovingTask) -> bool:
+    """Whether the log tells no heading: velocities in body axes alone, and gyros that hide the earth's rate."""
+    if task.gnss is not None or task.more:
+        return False
+    spec = task.spec
+    slow = np.max(spec.bias_variance[:3] - spec.constant_variance[:3])
+    rate = math.sqrt(spec.gyro_random_walk**2 / task.record.duration + max(float(slow), 0.0))
+    return rate > EARTH_RATE * math.cos(task.position.lat) * UNTOLD
+
+
+def with_heading_held(task: MovingTask, found: Pass, first: Guess) -> tuple[Pass, Spread] | None:
+    """The last of the passes that hold a heading, and what headings all round say of heading and level.
+
+    Parameters
+    ----------
+    task : MovingTask
+    found : Pass
+        The last of those that do not; its heading is held.
+    first : Guess
+        Of the first pass.
+
+    Returns
+    -------
+    Pass and Spread, or None
+        None where the filter breaks down, or level does not settle.
+    """
+    try:
+        last = _held(task, replace(found.guess, heading_sigma=HELD))
+        for _ in range(MOST):
+            before, last = (
+                last,
+                _held(task, replace(led_back(last.track, last.back, task.spec, first), heading_sigma=HELD)),
+            )
+            if _moved(before.track, last.track) < SETTLED:
+                return _of_all_round(task, last)
+    except DataError:  # the filter broke down
+        pass
+    return None
+
+
+def _held(task: MovingTask, guess: Guess) -> Pass:
+    return begun(task, guess, task.run(guess, gated=True))
+
+
+def _moved(before: Track, after: Track) -> float:
+    """Of its sigma, by which level at the end differs between two passes."""
+    up, sigma = after.C_nb[-1, 2], after.sigma[-1, PHI][:2]
+    tilt = (after.C_nb[-1] @ np.cross(up, before.C_nb[-1, 2]))[:2]
+    return float(np.max(np.abs(tilt) / sigma))
+
+
+def _of_all_round(task: MovingTask, last: Pass) -> tuple[Pass, Spread]:
+    """The best of passes held at headings all round, and the spread of those that explain the log as well."""
+    held = [last]
+    for k in range(1, HEADINGS):
+        turn = dcm_from_euler(2.0 * math.pi * k / HEADINGS, 0.0, 0.0)
+        held.append(_held(task, replace(last.guess, C_nb=turn @ last.guess.C_nb)))
+    cost = np.array([misfit(each.track.residuals) for each in held])
+    weight = np.exp(-0.5 * (cost - cost.min()))
+    best = int(np.argmin(cost))
+    spread = Spread.of([each.track.C_nb[-1] for each in held], best, weight / weight.sum())
+    return held[best], spread.and_more(2.0 * math.pi / HEADINGS / math.sqrt(12.0))
+
+
+def by_gravity(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Guess, Track]:
+    """Task, guess and track of a pass that takes no tilt for a bias; the same ones where the log speaks against it."""
+    held = task.with_level_biases_held()
+    try:
+        last = once_more(held, begun(held, first, held.run(first, gated=False)), first)
+        other = with_level_biases(task, last.track)
+    except DataError:  # the filter broke down
+        return task, found.guess, found.track
+    return (task, found.guess, found.track) if fits_worse(found.track, other) else (held, last.guess, other)
+
+
+def fits_worse(track: Track, other: Track) -> bool:
+    """Whether the log speaks for the first of two tracks by more than chance does, or the other rejects more of it."""
+    rejected = sum(
+        int(np.sum(b.used)) < int(np.sum(a.used)) for a, b in zip(track.residuals, other.residuals, strict=True)
+    )
+    return rejected > 0 or likelihood_ratio(other.residuals, track.residuals) > limit("rival")
