@@ -59,6 +59,7 @@ PASSES = 3  # that fit the noise of the master's rows, and the attitude to linea
 PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
 LEAST = 0.1  # of the noise to begin with: less is not believed
 SHORTEST = 5.0  # s
+USUAL, POORER = "industrial", "consumer"  # presets of a slave of which nothing is said
 RIVAL_DELAY = 0.2  # s, one sigma of a master's delay where gyros may be late
 
 
@@ -98,7 +99,7 @@ def align_transfer(
     master : MasterRecord
         At any rate and times, rows may be missing; attitude or velocity or both, position where there is one.
     imu : ImuSpec, str, path or mapping, optional
-        Specification of the slave; the preset "industrial" when left out.
+        Specification of the slave. Left out, the preset "industrial", or "consumer" where the log speaks against that.
     matching : {"auto", "velocity", "attitude", "both", "position", "acceleration", "position+attitude", "acceleration+attitude"}
         What of the master is matched; velocity and attitude, as far as it gives them, when left out. Position is slower than
         velocity and bears a constant error of the master's velocity (the sigma of velocity is against the master then);
@@ -147,8 +148,9 @@ def align_transfer(
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
     if flexure is not None and not what.attitude:
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
-    spec = noise_in(slave, with_rounding(imu_spec("industrial" if imu is None else imu), slave)).with_coning_of(slave)
-    where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
+    spec = imu_spec(USUAL if imu is None else imu)
+    where = f"preset {USUAL}, since none was given" if imu is None else f"specification {spec.name}"
+    record = slave
     slave = bridged(corrected(slave, spec, calibration))
 
     tell("comparing the clocks")
@@ -161,16 +163,24 @@ def align_transfer(
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise = first_noise(what, {**given, "attitude": attitude_noise})
 
-    def by(said: Assumed) -> Alignment:
+    def by(said: Assumed, spec: ImuSpec, where: str) -> Alignment:
+        seen = noise_in(record, with_rounding(spec, record)).with_coning_of(record)
         return _aligned(
-            slave, master, spec, where, said, notes, what, flexure, errors, noise, position, heading_limit, tell
+            slave, master, seen, where, said, notes, what, flexure, errors, noise, position, heading_limit, tell
         )
 
-    # Most arms of which nothing is said are a metre or two. Of a wide one the noise of a poor slave would part it from a delay.
-    unsaid = said.lever_arm_sigma == VEHICLE_ARM
-    answer = by(replace(said, lever_arm_sigma=LEVER_ARM_SIGMA) if unsaid else said)
-    if unsaid and any(item.key == "transfer.lever_arm" for item in answer.evidence):
-        answer = by(said)
+    def of(spec: ImuSpec, where: str) -> Alignment:
+        # Most arms of which nothing is said are a metre or two. Of a wide one the noise of a poor slave would part it from a delay.
+        unsaid = said.lever_arm_sigma == VEHICLE_ARM
+        answer = by(replace(said, lever_arm_sigma=LEVER_ARM_SIGMA) if unsaid else said, spec, where)
+        if unsaid and any(item.key == "transfer.lever_arm" for item in answer.evidence):
+            answer = by(said, spec, where)
+        return answer
+
+    answer = of(spec, where)
+    if imu is None and answer.status == "inconsistent":  # a poorer slave than is usual, which nobody spoke of
+        poorer = of(imu_spec(POORER), f"preset {POORER}, since none was given and the log speaks against {USUAL}")
+        answer = answer if poorer.status == "inconsistent" else poorer
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
 
 

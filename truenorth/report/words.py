@@ -64,6 +64,7 @@ WHY = (
     "inferred from the log",
     "specification {0}",
     "preset industrial, since none was given",
+    "preset consumer, since none was given and the log speaks against industrial",
 )
 
 
