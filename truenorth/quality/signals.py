@@ -17,6 +17,7 @@ from truenorth.core.compiled import compiled
 from truenorth.core.errors import DataError
 from truenorth.core.linalg import add_rows
 from truenorth.core.remembered import remembered
+from truenorth.core.vectors import load8, minus8, over8, plus8, product8, spread8, store8, times8, zero8
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
@@ -109,23 +110,23 @@ def white_noise(record: ImuRecord) -> Array:
     scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
     lengths = [max(1, round(tau / record.interval)) for tau in (0.02, 0.1, 0.5, 1.0, 2.0)]
     every = math.gcd(*lengths)
-    total = np.empty((rows // every + 1, 6))
+    total = np.empty((rows // every + 1, 8))
     _running_sums(record.gyro, record.accel, every, total)
     for m in lengths:
         count = rows // m
         if count < 4:
             break
         group = min(count - 1, max(3, round(duration / (m * record.interval))))
-        variance = np.empty(((count - 1) // group, 6))
+        variance = np.empty(((count - 1) // group, 8))
         _allan_variances(total, m // every, m, group, variance)
-        quiet = _lower_quartiles(variance)
+        quiet = _lower_quartiles(variance[:, :6])
         least = np.minimum(least, scale * np.sqrt(quiet * m * record.interval))
     return np.where(np.isfinite(least), least, 0.0)
 
 
 @compiled
 def _running_sums(gyro: Any, accel: Any, every: int, total: Any) -> None:
-    """Sums (M + 1, 6) of all rows up to each `every`-th, about the first, so that gravity does not eat their digits."""
+    """Sums (M + 1, 6 and two zeros) of all rows up to each `every`-th, about the first, so that gravity eats no digits of them."""
     total[0] = 0.0
     w0 = w1 = w2 = f0 = f1 = f2 = 0.0  # six sums that do not wait for each other
     for j in range(1, total.shape[0]):
@@ -137,6 +138,7 @@ def _running_sums(gyro: Any, accel: Any, every: int, total: Any) -> None:
             f1 += accel[k, 1] - accel[0, 1]
             f2 += accel[k, 2] - accel[0, 2]
         total[j, 0], total[j, 1], total[j, 2], total[j, 3], total[j, 4], total[j, 5] = w0, w1, w2, f0, f1, f2
+        total[j, 6], total[j, 7] = 0.0, 0.0
 
 
 def _lower_quartiles(values: Array) -> Array:
@@ -150,18 +152,17 @@ def _lower_quartiles(values: Array) -> Array:
 
 @compiled
 def _allan_variances(total: Any, step: int, m: int, group: int, variance: Any) -> None:
-    """Half the mean square of differences of means of `m` rows one behind the other, by groups (G, 6) of differences.
+    """Half the mean square of differences of means of `m` rows one behind the other, by groups (G, 8) of differences.
 
     From one sum to the next that is used there are `step`.
     """
     for g in range(variance.shape[0]):
-        variance[g] = 0.0
+        squares = zero8()
         for k in range(g * group * step, (g + 1) * group * step, step):
-            for i in range(6):
-                change = total[k + 2 * step, i] - 2.0 * total[k + step, i] + total[k, i]
-                variance[g, i] += change * change
-        for i in range(6):
-            variance[g, i] /= 2.0 * group * m * m
+            twice = times8(2.0, load8(total, (k + step, 0)))
+            change = plus8(minus8(load8(total, (k + 2 * step, 0)), twice), load8(total, (k, 0)))
+            squares = plus8(squares, product8(change, change))
+        store8(variance, (g, 0), over8(squares, spread8(2.0 * group * m * m)))
 
 
 def angle_wander(rates: Array, interval: float, per_second: int) -> Array:
@@ -240,7 +241,7 @@ def median_of_rows(values: Array) -> Array:
     half = values.shape[1] // 2
     before = half if values.shape[1] % 2 else half - 1
     parted = np.partition(values, (before, half), axis=1)
-    return 0.5 * (parted[:, [half]] + parted[:, [before]])
+    return np.asarray(0.5 * (parted[:, half : half + 1] + parted[:, before : before + 1]))
 
 
 def bias_by_gravity(rate: Array, force: Array) -> Array | None:
