@@ -17,7 +17,7 @@ from truenorth.core.vectors import load8, minus8, plus8, store8, times8, zero8
 from truenorth.filters.stack import Array
 from truenorth.filters.system import Estimates, LinearSystem, runs_of
 
-# States and rows of a base at rest. Kernels in which such sizes are written take three quarters of the time of those that are told
+# States and rows of a base at rest. Kernels in which such sizes are written take three quarters of the time of those that learn
 # them as they run, to the same bits.
 AT_REST = 12, 3
 BIASES, AXES = 6, 3
