@@ -29,7 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import skew
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
+from truenorth.core.vectors import load4, plus4, store4, times4, zero4
 from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem
 from truenorth.filters.gains import times
@@ -133,7 +134,20 @@ def _transitions(
                 own[i, phi + j] = -f_late[k, i, j]
                 own[i, bg + j] = -(T[k] ** 2) / 6.0 * turned
                 own[i, ba + j] = -T[k] * late[i, j]
-        times(C_n_n0[k], own, H[k])
+        _three_rows(C_n_n0[k], own, H[k])
+
+
+@borrowing(forceinline=True)
+def _three_rows(A: Any, B: Any, C: Any) -> None:
+    """``C = A B`` of three rows and `STATES` columns; `C` is neither."""
+    for j in range(0, STATES, 4):
+        x, y, z = zero4(), zero4(), zero4()
+        for k in range(B.shape[0]):
+            row = load4(B, (k, j))
+            x, y, z = plus4(x, times4(A[0, k], row)), plus4(y, times4(A[1, k], row)), plus4(z, times4(A[2, k], row))
+        store4(C, (0, j), x)
+        store4(C, (1, j), y)
+        store4(C, (2, j), z)
 
 
 class _Known(NamedTuple):
@@ -267,9 +281,9 @@ def _gains_of_velocity(Phi: Any, Q: Any, C: Any, H: Any, R: Any, S: Any) -> None
             for j in range(STATES):
                 own[i, j] = -back[i, j]
             own[i, dv + i] += 1.0
-        times(C[k], back, H[k])
-        times(C[k], own, work)
-        times(work, Q[k], own)  # C (E - J Phi^-1) Q: the transpose of S, as Q is symmetric
+        _three_rows(C[k], back, H[k])
+        _three_rows(C[k], own, work)
+        _three_rows(work, Q[k], own)  # C (E - J Phi^-1) Q: the transpose of S, as Q is symmetric
         for i in range(3):
             for j in range(STATES):
                 S[k, j, i] = own[i, j]
