@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from truenorth.alignment.matched import Signatures, innovations_of, matched
+from truenorth.alignment import matched as module
+from truenorth.alignment.matched import AT_REST, Innovations, Signatures, innovations_of, matched
 from truenorth.errors.staying import PHI
 from truenorth.filters import LinearSystem, filter_gains, kalman
 
-K, N, M, W = 12, 12, 3, 5
+K, N, M = 12, 12, 3
 
 
 def forward(system, gains, signatures, U, A, s):
@@ -25,7 +26,8 @@ def forward(system, gains, signatures, U, A, s):
 
 
 @pytest.mark.parametrize("other", [0, 2])
-def test_as_forward(other):
+@pytest.mark.parametrize("W", [5, AT_REST[2] - N])
+def test_as_forward(other, W):
     rng = np.random.default_rng(4)
     Phi = np.eye(N) + 0.1 * rng.standard_normal((K, N, N))
     H, S = rng.standard_normal((K, M, N)), 0.01 * rng.standard_normal((K, N, M))
@@ -64,3 +66,20 @@ def test_as_forward(other):
         energy, match = y @ information @ y, y @ information @ white
         np.testing.assert_allclose([ratio[s], size[s]], [match**2 / energy, match / energy], rtol=1e-10)
         np.testing.assert_allclose(left[:, s], e[PHI], rtol=1e-10, atol=1e-12)
+
+
+def test_sizes_written_in_the_kernel_change_no_bit(monkeypatch):
+    """A base at rest has a kernel of its own; told its sizes as it runs, the other one gives the same."""
+    rng, W = np.random.default_rng(5), AT_REST[2] - N
+    gains = SimpleNamespace(
+        step=0.3 * rng.standard_normal((K, N, N)),
+        H_Phi=rng.standard_normal((K, M, N)),
+        gain=rng.standard_normal((K, N, M)),
+    )
+    L = np.tril(rng.standard_normal((K, M, M))) + 3.0 * np.eye(M)
+    seen = Innovations(L, gains, rng.standard_normal((K, M, 1)))
+    shapes = ((N, 3), (M, 3), (W, 3), (N, W), (K, M, W))
+    signatures = Signatures(np.array([0, 4, K - 2]), *(rng.standard_normal(shape) for shape in shapes))
+    own = matched(seen, signatures)[0]
+    monkeypatch.setattr(module, "AT_REST", None)
+    np.testing.assert_array_equal(np.vstack([*own]), np.vstack([*matched(seen, signatures)[0]]))

@@ -5,6 +5,7 @@ import pytest
 
 from truenorth.core import linalg
 from truenorth.core.compiled import compiled
+from truenorth.core.vectors import load3, plus4, store3
 
 
 @compiled
@@ -26,6 +27,13 @@ def _conditioned(size, P, h, a, b, y):
 @compiled
 def _copied(A, B, rows, columns):
     linalg.copy_corner(A, B, rows, columns)
+
+
+@compiled
+def _doubled(A, B):
+    for k in range(len(A)):
+        row = load3(A, (k, 0))
+        store3(B, (k, 0), plus4(row, row))
 
 
 def _product(A, B):
@@ -76,6 +84,16 @@ def test_a_corner_is_copied_and_nothing_behind_it(columns):
     assert np.array_equal(B[:5, :columns], A[:5, :columns])
     assert np.all(B[5:] == -1.0)
     assert np.all(B[:, columns:] == -1.0)
+
+
+def test_a_row_of_three_is_read_and_written_alone():
+    """Neither the rest of its array nor what stands behind the last row of it is touched."""
+    A, B = np.arange(21.0).reshape(7, 3), np.full((8, 3), -1.0)
+    _doubled(A, B[:7])
+    assert np.array_equal(B[:7], 2.0 * A)
+    assert np.all(B[7] == -1.0)
+    _doubled(A[:3], A[:3])
+    assert np.array_equal(A[:4], [[0.0, 2.0, 4.0], [6.0, 8.0, 10.0], [12.0, 14.0, 16.0], [9.0, 10.0, 11.0]])
 
 
 def test_vectors_do_not_stand_in_arrays_with_gaps():

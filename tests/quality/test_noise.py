@@ -15,8 +15,8 @@ from truenorth.core.position import Position
 from truenorth.core.units import parse
 from truenorth.errors.staying import StaticModel
 from truenorth.quality.noise import gauss_markov_variance, noise_from_log, with_terms_seen
-from truenorth.quality.signals import _lower_quartiles
 from truenorth.records import ImuRecord
+from truenorth.records.one_pass import _lower_quartiles
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import rest, simulate
 

@@ -31,6 +31,11 @@ from truenorth.filters.gains import Gains, through
 Array = NDArray[np.float64]
 
 
+# States, rows of the measurement, states with all courses, and columns of innovations, of a base at rest: written in a kernel, they
+# save it a quarter of its time (:data:`truenorth.filters.gains.AT_REST`).
+AT_REST = 12, 3, 23, 1
+
+
 class Signatures(NamedTuple):
     """What may begin, S of them, and the courses that they take.
 
@@ -149,7 +154,9 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     ends = np.empty((len(behind), 3, n + courses))
     of_gains = tuple(np.ascontiguousarray(a) for a in (gains.step, gains.H_Phi, gains.gain, seen.L))
     white = np.ascontiguousarray(seen.white)
-    _sum_back(*of_gains, all_of.measured_course, all_of.state_course, white, behind, forms, ends)
+    at_rest = (n, gains.gain.shape[-1], n + courses, right) == AT_REST
+    sum_back = _sum_back_at_rest if at_rest else _sum_back
+    sum_back(of_gains, all_of.measured_course, all_of.state_course, white, behind, forms, ends)
     count = len(all_of.epoch)
     energy, match, left = np.empty(count), np.empty((count, right)), np.empty((3, count))
     _match_each(all_of, *of_gains, white, forms, ends, np.empty((2, n + courses)), energy, match, left)
@@ -263,24 +270,27 @@ def _match_each(
 
 
 @compiled
-def _sum_back(
-    step: Any,
-    H_Phi: Any,
-    gain: Any,
-    L: Any,
-    A: Any,
-    U: Any,
-    seen: Any,
-    behind: Any,
-    forms: Any,
-    ends: Any,
-) -> None:
+def _sum_back(of_gains: Any, A: Any, U: Any, seen: Any, behind: Any, forms: Any, ends: Any) -> None:
+    """:func:`_forms_of` any sizes."""
+    step, _, gain, _ = of_gains
+    sizes = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
+    _forms_of(sizes, of_gains, A, U, seen, behind, forms, ends)
+
+
+@compiled
+def _sum_back_at_rest(of_gains: Any, A: Any, U: Any, seen: Any, behind: Any, forms: Any, ends: Any) -> None:
+    """:func:`_forms_of` a base at rest."""
+    _forms_of(AT_REST, of_gains, A, U, seen, behind, forms, ends)
+
+
+@compiled(forceinline=True)
+def _forms_of(sizes: Any, of_gains: Any, A: Any, U: Any, seen: Any, behind: Any, forms: Any, ends: Any) -> None:
     """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last misalignment of it.
 
     The quadratic form comes first, the linear ones of the innovations are columns behind it. Rows have zeros at their ends.
     """
-    misalignment = STARTS[0]
-    n, m, used, right = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
+    misalignment, (step, H_Phi, gain, L) = STARTS[0], of_gains
+    n, m, used, right = sizes
     N, rows, wide = 4 * ((n + 3) // 4), 4 * ((used + 3) // 4), 8 * ((used + right + 7) // 8)
     form, end = np.zeros((rows, wide)), np.zeros((4, wide))
     for i in range(3):

@@ -16,11 +16,11 @@ from truenorth.coarse.wahba import triad
 from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.records import ImuRecord
+from truenorth.records.one_pass import BLOCKS, passed
 from truenorth.records.vibration import cone_drift
 from truenorth.strapdown.increments import in_blocks, read_only
 
 Array = NDArray[np.float64]
-BLOCKS = 10  # the scatter of this many block means shows how well the mean is known
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -45,12 +45,8 @@ class Means:
 
 def means(record: ImuRecord) -> Means:
     """Mean rate and specific force of a record."""
-    starts = np.linspace(0, len(record), min(BLOCKS, len(record)) + 1).astype(int)[:-1]
-    blocks = len(starts)
-    sums, edges = np.zeros((blocks, 7)), np.append(starts, len(record))
-    for rows, dtheta, dvel in in_blocks(record):
-        inside = np.clip(edges, rows.start, rows.stop) - rows.start
-        _block_sums(read_only(record.steps[rows]), read_only(dtheta), read_only(dvel), inside, sums)
+    sums = passed(record).blocks if record.kind == "increments" else _integrated(record)
+    blocks = len(sums)
     T, total = sums[:, :1], sums.sum(axis=0)
     w, f = sums[:, 1:4] / T, sums[:, 4:] / T
     return Means(
@@ -59,6 +55,16 @@ def means(record: ImuRecord) -> Means:
         w_covariance=scatter_of(w) / blocks,
         f_covariance=scatter_of(f) / blocks,
     )
+
+
+def _integrated(record: ImuRecord) -> Array:
+    """Time, angle and velocity (B, 7) of blocks of a log of rates."""
+    starts = np.linspace(0, len(record), min(BLOCKS, len(record)) + 1).astype(int)[:-1]
+    sums, edges = np.zeros((len(starts), 7)), np.append(starts, len(record))
+    for rows, dtheta, dvel in in_blocks(record):
+        inside = np.clip(edges, rows.start, rows.stop) - rows.start
+        _block_sums(read_only(record.steps[rows]), read_only(dtheta), read_only(dvel), inside, sums)
+    return sums
 
 
 def scatter_of(x: Array) -> Array:

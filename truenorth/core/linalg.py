@@ -348,17 +348,3 @@ def scaled_cholesky(A: Array) -> tuple[Array, Array]:
     if not np.all(size > 0.0):
         raise np.linalg.LinAlgError
     return size, np.linalg.cholesky(A / (size[..., :, None] * size[..., None, :]))
-
-
-@borrowing(forceinline=True)
-def add_rows(a: Array, b: Array, first: int, stop: int, before: tuple[float, ...]) -> tuple[float, ...]:
-    """Six sums over rows of two (N, 3) arrays, each in its own register, so that none waits for another."""
-    a0, a1, a2, b0, b1, b2 = before
-    for k in range(first, stop):
-        a0 += a[k, 0]
-        a1 += a[k, 1]
-        a2 += a[k, 2]
-        b0 += b[k, 0]
-        b1 += b[k, 1]
-        b2 += b[k, 2]
-    return a0, a1, a2, b0, b1, b2

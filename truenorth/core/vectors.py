@@ -109,6 +109,26 @@ def _make_load(width: int) -> Callable[..., Any]:
     return load
 
 
+def _make_load3(width: int) -> Callable[..., Any]:
+    """Of a row of three: two numbers and one, so that none behind the row is touched."""
+    vector = _vector(width)
+
+    def load(typing: Any, array: Any, index: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            from llvmlite import ir
+
+            two = _place(context, builder, signature, args, 2)
+            first = builder.bitcast(two, ir.DoubleType().as_pointer())
+            third = builder.load(builder.gep(first, [ir.Constant(ir.IntType(64), 2)]), align=8)
+            none = ir.Constant(ir.VectorType(ir.DoubleType(), 2), [0.0, 0.0])
+            rest = builder.insert_element(none, third, ir.Constant(ir.IntType(32), 0))
+            return _mixed(builder, builder.load(two, align=8), rest, (0, 1, 2, 3))
+
+        return vector(array, index), code
+
+    return load
+
+
 def _make_store(width: int) -> Callable[..., Any]:
     from numba.core import types
 
@@ -117,6 +137,27 @@ def _make_store(width: int) -> Callable[..., Any]:
     def store(typing: Any, array: Any, index: Any, values: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             builder.store(args[2], _place(context, builder, signature, args, width), align=8)
+            return context.get_dummy_value()
+
+        return types.void(array, index, vector), code
+
+    return store
+
+
+def _make_store3(width: int) -> Callable[..., Any]:
+    """Into a row of three: the fourth number goes nowhere."""
+    from numba.core import types
+
+    vector = _vector(width)
+
+    def store(typing: Any, array: Any, index: Any, values: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            from llvmlite import ir
+
+            two = _place(context, builder, signature, args, 2)
+            builder.store(_mixed(builder, args[2], args[2], (0, 1)), two, align=8)
+            third = builder.gep(builder.bitcast(two, ir.DoubleType().as_pointer()), [ir.Constant(ir.IntType(64), 2)])
+            builder.store(builder.extract_element(args[2], ir.Constant(ir.IntType(32), 2)), third, align=8)
             return context.get_dummy_value()
 
         return types.void(array, index, vector), code
@@ -203,6 +244,7 @@ def _mixed(builder: Any, a: Any, b: Any, places: tuple[int, ...]) -> Any:
 
 zero4, zero8 = VectorStep(_make_zero, 4), VectorStep(_make_zero, 8)
 load4, load8 = VectorStep(_make_load, 4), VectorStep(_make_load, 8)
+load3, store3 = VectorStep(_make_load3, 4), VectorStep(_make_store3, 4)  # a row of three; in the register also a zero
 store4, store8 = VectorStep(_make_store, 4), VectorStep(_make_store, 8)
 spread4, spread8 = VectorStep(_make_spread, 4), VectorStep(_make_spread, 8)  # a number in every lane
 times4, times8 = VectorStep(_make_times, 4), VectorStep(_make_times, 8)  # of a number and a vector

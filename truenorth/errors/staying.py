@@ -29,10 +29,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import skew
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
+from truenorth.core.vectors import load3, load4, minus4, plus4, store3, store4, times4, zero4
 from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem
-from truenorth.filters.gains import times
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_position, gravity_velocity
 
 Array = NDArray[np.float64]
@@ -112,28 +112,52 @@ def _transitions(
     C_n_n0 : (K, 3, 3) array
     """
     phi, dv, bg, ba = STARTS
-    mean, late, own = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, STATES))
+    mean, late, own = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, STATES))
     for i in range(3):
         own[i, dv + i] = 1.0
     for k in range(len(T)):
-        times(C_n0_i, C_ib_mean[k], mean)
-        times(C_n0_i, C_ib_late[k], late)
+        _turned(C_n0_i, C_ib_mean[k], mean)
+        _turned(C_n0_i, C_ib_late[k], late)
         for i in range(STATES):
             Phi[k, i, i] = 1.0
         for i in range(3):
-            for j in range(3):
-                turned, fallen = 0.0, 0.0
-                for r in range(3):
-                    turned += f[k, i, r] * mean[r, j]
-                    fallen += f_late[k, i, r] * (mean[r, j] - late[r, j])
-                Phi[k, phi + i, bg + j] = -T[k] * mean[i, j]
-                Phi[k, dv + i, phi + j] = T[k] * f[k, i, j]
-                Phi[k, dv + i, bg + j] = -2.0 * T[k] * fallen
-                Phi[k, dv + i, ba + j] = T[k] * mean[i, j]
-                own[i, phi + j] = -f_late[k, i, j]
-                own[i, bg + j] = -(T[k] ** 2) / 6.0 * turned
-                own[i, ba + j] = -T[k] * late[i, j]
-        times(C_n_n0[k], own, H[k])
+            turned, fallen = zero4(), zero4()
+            for r in range(3):
+                row = load4(mean, (r, 0))
+                turned = plus4(turned, times4(f[k, i, r], row))
+                fallen = plus4(fallen, times4(f_late[k, i, r], minus4(row, load4(late, (r, 0)))))
+            row = load4(mean, (i, 0))
+            store3(Phi, (k, phi + i, bg), times4(-T[k], row))
+            store3(Phi, (k, dv + i, phi), times4(T[k], load3(f, (k, i, 0))))
+            store3(Phi, (k, dv + i, bg), times4(-2.0 * T[k], fallen))
+            store3(Phi, (k, dv + i, ba), times4(T[k], row))
+            store3(own, (i, phi), times4(-1.0, load3(f_late, (k, i, 0))))
+            store3(own, (i, bg), times4(-(T[k] ** 2) / 6.0, turned))
+            store3(own, (i, ba), times4(-T[k], load4(late, (i, 0))))
+        _three_rows(C_n_n0[k], own, H[k])
+
+
+@borrowing(forceinline=True)
+def _turned(A: Any, B: Any, C: Any) -> None:
+    """``C = A B`` of three rows and columns; `C` has a fourth column, of zeros."""
+    for i in range(3):
+        total = zero4()
+        for r in range(3):
+            total = plus4(total, times4(A[i, r], load3(B, (r, 0))))
+        store4(C, (i, 0), total)
+
+
+@borrowing(forceinline=True)
+def _three_rows(A: Any, B: Any, C: Any) -> None:
+    """``C = A B`` of three rows and `STATES` columns; `C` is neither."""
+    for j in range(0, STATES, 4):
+        x, y, z = zero4(), zero4(), zero4()
+        for k in range(B.shape[0]):
+            row = load4(B, (k, j))
+            x, y, z = plus4(x, times4(A[0, k], row)), plus4(y, times4(A[1, k], row)), plus4(z, times4(A[2, k], row))
+        store4(C, (0, j), x)
+        store4(C, (1, j), y)
+        store4(C, (2, j), z)
 
 
 class _Known(NamedTuple):
@@ -267,9 +291,9 @@ def _gains_of_velocity(Phi: Any, Q: Any, C: Any, H: Any, R: Any, S: Any) -> None
             for j in range(STATES):
                 own[i, j] = -back[i, j]
             own[i, dv + i] += 1.0
-        times(C[k], back, H[k])
-        times(C[k], own, work)
-        times(work, Q[k], own)  # C (E - J Phi^-1) Q: the transpose of S, as Q is symmetric
+        _three_rows(C[k], back, H[k])
+        _three_rows(C[k], own, work)
+        _three_rows(work, Q[k], own)  # C (E - J Phi^-1) Q: the transpose of S, as Q is symmetric
         for i in range(3):
             for j in range(STATES):
                 S[k, j, i] = own[i, j]

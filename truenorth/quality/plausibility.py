@@ -7,12 +7,9 @@ and axes; data at rest show the gyros' unit only if the gyros resolve the earth'
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.turning import AGREES, Turning, fit_turning
 from truenorth.core.units import STANDARD_GRAVITY as G
@@ -20,6 +17,7 @@ from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding
 from truenorth.quality.signals import even_rates
 from truenorth.records import ImuRecord
+from truenorth.records.one_pass import passed
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -79,7 +77,7 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
     dt = record.interval
     unit = dt if record.kind == "increments" else 1.0
     # Where all of them are near gravity the median is.
-    if all(abs(np.sqrt(extreme) / unit / G - 1.0) < limit("gravity") for extreme in _extremes(record.accel)):
+    if all(abs(np.sqrt(extreme) / unit / G - 1.0) < limit("gravity") for extreme in passed(record).force):
         return True
     level = float(np.median(np.linalg.norm(record.accel, axis=1))) / unit
     if abs(level / G - 1.0) < limit("gravity"):
@@ -112,16 +110,6 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
         text = f"{found}: unit, range or scale factor are wrong, or the base accelerates throughout"
         findings.append(Finding("warning", "accel_level", text))
     return False
-
-
-@compiled
-def _extremes(vectors: Any) -> Any:
-    """The smallest and the largest square of the lengths of vectors (N, 3)."""
-    least, most = np.inf, 0.0
-    for k in range(len(vectors)):
-        square = vectors[k, 0] ** 2 + vectors[k, 1] ** 2 + vectors[k, 2] ** 2
-        least, most = min(least, square), max(most, square)
-    return least, most
 
 
 def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:

@@ -5,7 +5,6 @@ A few passes over the samples.
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from typing import Any
 
@@ -15,14 +14,13 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import normalised, quaternion_from_rotation_vector, quaternion_product, rotate
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import DataError
-from truenorth.core.linalg import add_rows
 from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
+from truenorth.records.one_pass import passed, rows_of_cell
 
 Array = NDArray[np.float64]
 
 ARCSEC = np.pi / (180.0 * 3600.0)
-CELL = 0.1  # s, the samples are averaged over this first
 WINDOW = 10  # s, over which the angle's wander and the gain of speed are judged
 LEVEL_WINDOW = 31  # s, odd; the direction of gravity is the median over it
 # Three arcseconds are what spoils north by a degree in 15 s of static averaging.
@@ -46,11 +44,10 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
         A log of a few rows over so long a time that the grid does not fit into memory: it names the longest gap. Rows that came
         in blocks, stamped one right after the other.
     """
-    rows_a_cell = max(1, round(CELL / record.interval))
+    rows_a_cell = rows_of_cell(record)
     interval = rows_a_cell * record.interval
     if not record.gaps.size and abs(record.duration / len(record) - record.interval) < 0.01 * record.interval:
-        mean = np.empty((6, len(record) // rows_a_cell))
-        _cell_means(record.gyro, record.accel, rows_a_cell, mean)
+        mean = passed(record).cells
         return interval, mean if record.kind == "rates" else mean / record.interval
     data = np.hstack([record.gyro, record.accel])
     # Uneven time: integrals to the cell edges, no rate inside a gap other than the mean of its ends.
@@ -82,86 +79,18 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
     return interval, rates
 
 
-@compiled
-def _cell_means(gyro: Any, accel: Any, rows: int, mean: Any) -> None:
-    """Means (6, cells) of so many rows each."""
-    for cell in range(mean.shape[1]):
-        nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        w0, w1, w2, f0, f1, f2 = add_rows(gyro, accel, cell * rows, (cell + 1) * rows, nothing)
-        mean[0, cell], mean[1, cell], mean[2, cell] = w0 / rows, w1 / rows, w2 / rows
-        mean[3, cell], mean[4, cell], mean[5, cell] = f0 / rows, f1 / rows, f2 / rows
-
-
 def second_means(signal: Array, per_second: int) -> Array:
     """(3, seconds) means of (3, cells)."""
     return np.asarray(signal.reshape(3, -1, per_second) @ np.ones(per_second) / per_second)
 
 
-@remembered
 def white_noise(record: ImuRecord) -> Array:
     """(6,) random walk of the quiet quarter of the record: the least ``sigma(tau) sqrt(tau)`` of several tau.
 
     The least, because the angle of a disturbed base is bounded: its Allan deviation falls faster than white
     noise's at averaging times above the disturbance's period, and stays small far below it.
     """
-    duration, rows = 20.0, len(record)
-    least = np.full(6, np.inf)
-    scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
-    lengths = [max(1, round(tau / record.interval)) for tau in (0.02, 0.1, 0.5, 1.0, 2.0)]
-    every = math.gcd(*lengths)
-    total = np.empty((rows // every + 1, 6))
-    _running_sums(record.gyro, record.accel, every, total)
-    for m in lengths:
-        count = rows // m
-        if count < 4:
-            break
-        group = min(count - 1, max(3, round(duration / (m * record.interval))))
-        variance = np.empty(((count - 1) // group, 6))
-        _allan_variances(total, m // every, m, group, variance)
-        quiet = _lower_quartiles(variance)
-        least = np.minimum(least, scale * np.sqrt(quiet * m * record.interval))
-    return np.where(np.isfinite(least), least, 0.0)
-
-
-@compiled
-def _running_sums(gyro: Any, accel: Any, every: int, total: Any) -> None:
-    """Sums (M + 1, 6) of all rows up to each `every`-th, about the first, so that gravity does not eat their digits."""
-    total[0] = 0.0
-    w0 = w1 = w2 = f0 = f1 = f2 = 0.0  # six sums that do not wait for each other
-    for j in range(1, total.shape[0]):
-        for k in range((j - 1) * every, j * every):
-            w0 += gyro[k, 0] - gyro[0, 0]
-            w1 += gyro[k, 1] - gyro[0, 1]
-            w2 += gyro[k, 2] - gyro[0, 2]
-            f0 += accel[k, 0] - accel[0, 0]
-            f1 += accel[k, 1] - accel[0, 1]
-            f2 += accel[k, 2] - accel[0, 2]
-        total[j, 0], total[j, 1], total[j, 2], total[j, 3], total[j, 4], total[j, 5] = w0, w1, w2, f0, f1, f2
-
-
-def _lower_quartiles(values: Array) -> Array:
-    """Of each column, between the two nearest in proportion: those of :func:`numpy.quantile`, which takes longer to begin."""
-    place = 0.25 * (len(values) - 1)
-    below = int(place)
-    above = min(below + 1, len(values) - 1)
-    ordered = np.partition(values, (below, above), axis=0)
-    return np.asarray(ordered[below] + (place - below) * (ordered[above] - ordered[below]))
-
-
-@compiled
-def _allan_variances(total: Any, step: int, m: int, group: int, variance: Any) -> None:
-    """Half the mean square of differences of means of `m` rows one behind the other, by groups (G, 6) of differences.
-
-    From one sum to the next that is used there are `step`.
-    """
-    for g in range(variance.shape[0]):
-        variance[g] = 0.0
-        for k in range(g * group * step, (g + 1) * group * step, step):
-            for i in range(6):
-                change = total[k + 2 * step, i] - 2.0 * total[k + step, i] + total[k, i]
-                variance[g, i] += change * change
-        for i in range(6):
-            variance[g, i] /= 2.0 * group * m * m
+    return passed(record).white_noise
 
 
 def angle_wander(rates: Array, interval: float, per_second: int) -> Array:
@@ -240,7 +169,7 @@ def median_of_rows(values: Array) -> Array:
     half = values.shape[1] // 2
     before = half if values.shape[1] % 2 else half - 1
     parted = np.partition(values, (before, half), axis=1)
-    return 0.5 * (parted[:, [half]] + parted[:, [before]])
+    return np.asarray(0.5 * (parted[:, half : half + 1] + parted[:, before : before + 1]))
 
 
 def bias_by_gravity(rate: Array, force: Array) -> Array | None:

@@ -27,14 +27,13 @@ Sources: F. B. Hildebrand, "Introduction to Numerical Analysis", 2nd ed. (1974),
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.compiled import compiled
 from truenorth.core.remembered import remembered
 from truenorth.records.imu import ImuRecord
+from truenorth.records.one_pass import passed
 
 Array = NDArray[np.float64]
 
@@ -79,8 +78,7 @@ def _cones(record: ImuRecord) -> Array:
     length = max(round(BLOCK / record.interval), FEWEST)
     rates = record.kind == "rates"
     unit = 1.0 if rates else 1.0 / record.interval
-    sums = np.empty((2, 3))
-    _sums(record.gyro, sums)
+    sums = passed(record).gyro
     variance = unit**2 * (sums[1] / len(record) - (sums[0] / len(record)) ** 2)
     slowest = 2.0 * math.pi / (length * record.interval)
     blocks = len(record) // length if float(variance.max()) > LEAST_CONE * slowest else 0
@@ -99,18 +97,6 @@ def _cones(record: ImuRecord) -> Array:
         W = np.fft.rfft((rows - mean).T * window)[:, 1:]
         drift[at] = [(W[j].imag * W[k].real - W[j].real * W[k].imag) @ weight for j, k in ((1, 2), (2, 0), (0, 1))]
     return drift
-
-
-@compiled
-def _sums(rows: Any, sums: Any) -> None:
-    """Sums of columns (N, 3), and of their squares, in one pass: six of them, of which none waits for another."""
-    a = b = c = aa = bb = cc = 0.0
-    for k in range(len(rows)):
-        x, y, z = rows[k, 0], rows[k, 1], rows[k, 2]
-        a, b, c = a + x, b + y, c + z
-        aa, bb, cc = aa + x * x, bb + y * y, cc + z * z
-    sums[0, 0], sums[0, 1], sums[0, 2] = a, b, c
-    sums[1, 0], sums[1, 1], sums[1, 2] = aa, bb, cc
 
 
 def share_of_increments(x: Array) -> Array:

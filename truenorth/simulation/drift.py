@@ -22,11 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.compiled import compiled
+from truenorth.core.vectors import load3, load4, plus4, store3, store4, times4
 from truenorth.simulation.normals import Normals, draw, normals_of, words_of
 from truenorth.simulation.streams import stream
 
 Array = NDArray[np.float64]
-BLOCK = 256  # rows that are worked on at once
+BLOCK = 1024  # rows that are worked on at once
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
@@ -136,7 +137,7 @@ class Wander:
 def _drawn(recursion: Recursion, count: int, rng: np.random.Generator) -> Array:
     """Integrals of three axes, (count, 3)."""
     x, steps = np.zeros((count, 3)), normals_of(rng)
-    _recur(recursion, steps, np.zeros(3), steps, 0.0, x[:0], np.zeros((3, 3)), x)
+    _recur(recursion, steps, np.zeros(3), steps, 0.0, x, np.zeros((3, 3)), x)
     generator: Any = rng.bit_generator
     generator.advance(words_of(steps))
     return x
@@ -163,34 +164,37 @@ def _ramp(v: Array, tau: float) -> Array:
 def _recur(
     recursion: Any, steps: Normals, bias: Any, white: Normals, walk: float, sensed: Any, matrix: Any, out: Any
 ) -> None:
-    """Add ``bias``, the recursion and white noise to rows, or to what sensors of a `matrix` make of those that are `sensed`.
+    """``(I + matrix) x`` of rows that are sensed, a bias, the recursion and white noise, in this order; `out` may be `sensed`.
 
-    What is drawn are the numbers of ``standard_normal((count + 1, 3))``.
+    What is drawn are the numbers of ``standard_normal((count + 1, 3))``. A row is a vector of four; the last counts nowhere.
     """
-    d, alpha, beta, before = recursion.decay, recursion.alpha, recursion.beta, recursion.before
-    e, w, e0 = np.empty((BLOCK, 3)), np.zeros((BLOCK, 3)), np.empty(3)
-    flat, flat_w = e.reshape(-1), w.reshape(-1)
-    draw(steps, e0)
-    x, y, z = before * e0[0], before * e0[1], before * e0[2]
-    a, b, c = 0.0, 0.0, 0.0  # numbers of the row before
+    d, alpha, beta = recursion.decay, recursion.alpha, recursion.beta
+    e, w = np.zeros(3 * BLOCK + 4), np.zeros(3 * BLOCK + 1)  # before `e` the numbers of the row before
+    constants = np.zeros((5, 4))  # columns of the matrix, the bias, and what wanders before the first row
+    draw(steps, e[:3])
+    for i in range(3):
+        for j in range(3):
+            constants[j, i] = matrix[i, j]
+        constants[3, i], constants[4, i] = bias[i], recursion.before * e[i]
+        e[i] = 0.0
+    a, b, c = load4(constants, (0, 0)), load4(constants, (1, 0)), load4(constants, (2, 0))
+    offset, x = load4(constants, (3, 0)), load4(constants, (4, 0))
     decay = 1.0  # none before the first
     for first in range(0, len(out), BLOCK):
         count = min(BLOCK, len(out) - first)
-        draw(steps, flat[: 3 * count])
+        draw(steps, e[3 : 3 + 3 * count])
         if walk > 0.0:
-            draw(white, flat_w[: 3 * count])
-        rows = out[first : first + count]
-        if len(sensed) > 0:
-            sense(sensed[first : first + count], matrix, rows)
+            draw(white, w[: 3 * count])
+        ideal, rows = sensed[first : first + count], out[first : first + count]
         for k in range(count):
-            x = decay * x + alpha * e[k, 0] + beta * a
-            y = decay * y + alpha * e[k, 1] + beta * b
-            z = decay * z + alpha * e[k, 2] + beta * c
-            a, b, c = e[k, 0], e[k, 1], e[k, 2]
-            rows[k, 0] = ((rows[k, 0] + bias[0]) + x) + walk * w[k, 0]
-            rows[k, 1] = ((rows[k, 1] + bias[1]) + y) + walk * w[k, 1]
-            rows[k, 2] = ((rows[k, 2] + bias[2]) + z) + walk * w[k, 2]
+            x = plus4(times4(decay, x), times4(alpha, load4(e, (3 * k + 3,))))
+            x = plus4(x, times4(beta, load4(e, (3 * k,))))
+            row = plus4(load3(ideal, (k, 0)), times4(ideal[k, 0], a))
+            row = plus4(plus4(row, times4(ideal[k, 1], b)), times4(ideal[k, 2], c))
+            row = plus4(plus4(row, offset), x)
+            store3(rows, (k, 0), plus4(row, times4(walk, load4(w, (3 * k,)))))
             decay = d
+        store4(e, (0,), load4(e, (3 * count,)))
 
 
 @compiled

@@ -22,6 +22,7 @@ from truenorth.core.attitude import (
 )
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
+from truenorth.core.vectors import load3, load4, minus4, store4, times4, transposed4
 from truenorth.strapdown.coning import (
     Algorithm,
     coefficients,
@@ -198,12 +199,22 @@ def _inertial_integrals(
 @borrowing(forceinline=True)
 def _take_biases_off(dtheta: Any, dvel: Any, steps: Any, bias: Any, first: int, count: int, w: _Rows) -> bool:
     """Increments of rows from the first on, by columns; whether all turn by less than the series are good for."""
-    large = False
-    for k in range(count):
-        T = steps[first + k]
+    large, whole = False, count - count % 4
+    for k in range(0, whole, 4):
+        T = load4(steps, (first + k,))
+        for rows, own in ((dtheta, 0), (dvel, 3)):
+            r = first + k
+            turned = transposed4(
+                load3(rows, (r, 0)), load3(rows, (r + 1, 0)), load3(rows, (r + 2, 0)), load3(rows, (r + 3, 0))
+            )
+            store4(w.own, (own, k + 1), minus4(turned[0], times4(bias[own], T)))
+            store4(w.own, (own + 1, k + 1), minus4(turned[1], times4(bias[own + 1], T)))
+            store4(w.own, (own + 2, k + 1), minus4(turned[2], times4(bias[own + 2], T)))
+    for k in range(whole, count):
         for i in range(3):
-            w.own[i, k + 1] = dtheta[first + k, i] - T * bias[i]
-            w.own[3 + i, k + 1] = dvel[first + k, i] - T * bias[3 + i]
+            w.own[i, k + 1] = dtheta[first + k, i] - steps[first + k] * bias[i]
+            w.own[3 + i, k + 1] = dvel[first + k, i] - steps[first + k] * bias[3 + i]
+    for k in range(count):
         large |= w.own[0, k + 1] ** 2 + w.own[1, k + 1] ** 2 + w.own[2, k + 1] ** 2 > SURELY_SMALL
     return not large
 
