@@ -195,10 +195,10 @@ def test_car_levels_alike_by_gnss_and_by_both(begin, end):
         assert abs(off) < 2.5 * np.hypot(both.euler_sigma[one], alone.euler_sigma[one]), name
 
 
-def test_car_without_gnss_claims_no_heading(car):
+def test_car_without_gnss_claims_no_heading():
     from truenorth.core.position import Position
 
-    imu, odometer, _, _ = car
+    imu, odometer, _ = recordings.car_mems_odo_gnss()
     place = Position.from_degrees(59.35, 18.07, 30.0)
     answer = align_in_motion(imu, "consumer", odometer=odometer, wheel=CAR_WHEEL, position=place)
     assert answer.status == "level_only"
