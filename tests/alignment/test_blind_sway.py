@@ -40,8 +40,9 @@ def test_level_of_a_ship_by_gyros_that_do_not_see_the_earth_turn(imu: str, given
     assert np.max(np.abs(misses(answer, truth)["level"])) < 4.0
 
 
-def test_a_good_imu_of_which_nothing_is_said_keeps_its_heading() -> None:
-    record, place, truth = _ship("navigation", 5, 240.0)
+@pytest.mark.parametrize("duration", some([150.0], [240.0]))
+def test_a_good_imu_of_which_nothing_is_said_keeps_its_heading(duration: float) -> None:
+    record, place, truth = _ship("navigation", 5, duration)
     answer = align(record, place)
     assert answer.status == "aligned", answer.reasons
     assert max(float(np.abs(x).max()) for x in misses(answer, truth).values()) < 4.0

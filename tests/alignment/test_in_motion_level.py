@@ -38,7 +38,7 @@ def logs(kind, run):
     return motion, record, simulate_sensor(motion, spec, duration=SPAN, seed=77, run=run).record
 
 
-@few_and_all(12, few=2)
+@few_and_all(12, few=1)
 @pytest.mark.parametrize("kind", ["at rest", "straight on"])
 def test_level_is_as_good_as_the_accelerometers(kind, runs):
     """Before: 11 sigmas off at rest and 13 straight on, six logs each. Two numbers a run; false alarms 1 in 1000."""

@@ -43,7 +43,7 @@ def test_a_gyro_of_an_indexed_imu():
 
 
 @pytest.mark.parametrize("bench", ["swaying", "rotary"])
-@few_and_all(20, few=2)
+@few_and_all(20, few=1)
 def test_sound_gyros_are_of_one_moment(bench, runs):
     """The limit is passed once in a million."""
     for run in range(runs):

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -78,17 +79,21 @@ def test_another_epoch(method):
     np.testing.assert_allclose(early.C_nb, late.C_nb, atol=np.radians(0.2 / 60))
 
 
+@cache
+def driven(run):
+    """Five minutes of the ring by a vehicle, with the IMU turned on it by a known mounting."""
+    scenario = read_scenario("odometer_ring")
+    made = scenario.simulate(seed=6, run=run)
+    odometer = scenario.simulate_aiding(seed=6, run=run)["odometer"].record
+    at = made.motion.states(np.array([0.0]))
+    place = Position(float(at.lat[0]), float(at.lon[0]), float(at.alt[0]), 2.0, 2.0)
+    return made.record.between(0.0, 300.0), odometer, place, scenario.imu_spec, made.motion
+
+
 @pytest.fixture(scope="module")
 def drives():
-    """Five minutes of the ring by four vehicles, each with the IMU turned on its vehicle by a known mounting."""
-    scenario, found = read_scenario("odometer_ring"), []
-    for run in range(4):
-        made = scenario.simulate(seed=6, run=run)
-        odometer = scenario.simulate_aiding(seed=6, run=run)["odometer"].record
-        at = made.motion.states(np.array([0.0]))
-        place = Position(float(at.lat[0]), float(at.lon[0]), float(at.alt[0]), 2.0, 2.0)
-        found.append((made.record.between(0.0, 300.0), odometer, place, scenario.imu_spec, made.motion))
-    return found
+    """Of four vehicles."""
+    return [driven(run) for run in range(4)]
 
 
 def phi_of(answer, motion, C_bm):
@@ -151,9 +156,9 @@ def test_gyros_that_do_not_see_the_earth_turn_are_refused(drives):
         align(record, place, "industrial", aid=Odometer(odometer), method="sgkf")
 
 
-def test_two_answers_from_one_log(drives):
+def test_two_answers_from_one_log():
     """What the other answer leaves is added to sigma; two that exclude each other are a contradiction; equal ones say nothing."""
-    record, odometer, place, spec, _ = drives[0]
+    record, odometer, place, spec, _ = driven(0)
     own = align(record, place, spec, aid=Odometer(odometer))
     sigma = np.sqrt(np.diag(own.phi_covariance))
 
@@ -170,8 +175,8 @@ def test_two_answers_from_one_log(drives):
     assert (differs.key, differs.kind) == ("answers.differ", "unknown")
 
 
-def test_an_odometer_is_needed(drives):
-    record, _, place, spec, motion = drives[0]
+def test_an_odometer_is_needed():
+    record, _, place, spec, motion = driven(0)
     at = motion.states(record.time[::100])
     gnss = GnssRecord(record.time[::100], v_n=at.v_n, lat=at.lat, lon=at.lon, alt=at.alt)
     with pytest.raises(UsageError, match="is that of an odometer"):

@@ -24,6 +24,7 @@ def read_with(record, axis, scale):
     return replace(record, accel=accel)
 
 
+@pytest.mark.usefixtures("without_gyro_matrix")
 @pytest.mark.parametrize(
     ("run", "axis", "scale"), some([(33, 1, -0.159)], [(27, 1, -0.274), (24, 0, -0.22), (0, 0, 0.1)])
 )

@@ -49,10 +49,15 @@ def test_a_poorer_imu_counts_unless_the_measurements_rule_it_out(size, found):
         assert evidence[0].effect.level == pytest.approx(0.004, rel=0.01)
 
 
-def test_biases_that_are_together_too_large_are_in_sigma():
-    """Each of six at 2.7 of its sigmas: none alone is beyond the specification, all together are."""
+@pytest.fixture(scope="module")
+def sound():
+    """The answer of a sound drive; never changed."""
     bench = BENCHES["gnss"]
-    sound = bench.align(bench.draw(9305, 0)[0])
+    return bench.align(bench.draw(9305, 0)[0])
+
+
+def test_biases_that_are_together_too_large_are_in_sigma(sound):
+    """Each of six at 2.7 of its sigmas: none alone is beyond the specification, all together are."""
     gyro, accel = sound.gyro_bias_prior, sound.accel_bias_prior
 
     def found(size, sigma=0.05):
@@ -77,10 +82,8 @@ def test_biases_that_are_together_too_large_are_in_sigma():
 
 
 @pytest.mark.parametrize(("size", "first"), [(0.05, "specification"), (0.25, "imu_axes")])
-def test_a_bias_of_a_quarter_of_g_says_that_axes_are_wrong(size, first):
+def test_a_bias_of_a_quarter_of_g_says_that_axes_are_wrong(sound, size, first):
     """Of g: no specification makes it up, and no poorer one is tried."""
-    bench = BENCHES["gnss"]
-    sound = bench.align(bench.draw(9305, 0)[0])
     wrong = replace(sound, accel_bias=np.array([9.8 * size, 0.0, 0.0]), accel_bias_sigma=np.full(3, 0.01))
     (item,) = [item for item in bias_evidence(wrong) if item.key == "bias.accel"]
     assert item.remedies[0] == first

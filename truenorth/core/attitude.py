@@ -104,14 +104,11 @@ def dcm_from_euler(heading: ArrayLike, pitch: ArrayLike, roll: ArrayLike) -> Arr
     """``C_nb = Rz(-heading) Rx(pitch) Ry(roll)``, (..., 3, 3), of angles in rad."""
     h, p, r = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in (heading, pitch, roll)))
     sh, ch, sp, cp, sr, cr = np.sin(h), np.cos(h), np.sin(p), np.cos(p), np.sin(r), np.cos(r)
-    return np.stack(
-        [
-            np.stack([ch * cr + sh * sp * sr, sh * cp, ch * sr - sh * sp * cr], -1),
-            np.stack([-sh * cr + ch * sp * sr, ch * cp, -sh * sr - ch * sp * cr], -1),
-            np.stack([-cp * sr, sp, cp * cr], -1),
-        ],
-        -2,
-    )
+    C = np.empty((*h.shape, 3, 3))
+    C[..., 0, 0], C[..., 0, 1], C[..., 0, 2] = ch * cr + sh * sp * sr, sh * cp, ch * sr - sh * sp * cr
+    C[..., 1, 0], C[..., 1, 1], C[..., 1, 2] = -sh * cr + ch * sp * sr, ch * cp, -sh * sr - ch * sp * cr
+    C[..., 2, 0], C[..., 2, 1], C[..., 2, 2] = -cp * sr, sp, cp * cr
+    return C
 
 
 def euler_from_dcm(C_nb: ArrayLike) -> tuple[Array, Array, Array]:
