@@ -96,6 +96,11 @@ def askew(rng: np.random.Generator) -> Mapping[str, Any]:
     }
 
 
+def cheap(imu: str) -> Callable[[np.random.Generator], Mapping[str, Any]]:
+    """The same S-turns with an IMU whose gyros hide the earth's rate: no heading, and level as turns tell it."""
+    return lambda rng: {**askew(rng), "imu": imu}
+
+
 def as_assumed(
     scenario: Callable[[np.random.Generator], Mapping[str, Any]],
 ) -> Callable[[np.random.Generator], Mapping[str, Any]]:
@@ -203,6 +208,11 @@ CASES = (
         as_assumed(askew),
         by("navigation", noise=ODOMETER_SIGMA),
         GOOD,
+    ),
+    *(
+        Case(f"odometer, S-turns, {imu} IMU{how}", world(cheap(imu)), by(imu, noise=noise), GOOD)
+        for imu in ("industrial", "consumer")
+        for how, world, noise in (("", lambda same: same, None), (", errors as assumed", as_assumed, ODOMETER_SIGMA))
     ),
     Case("odometer noisier than usual (.3 m/s)", NOISY, by("navigation"), GOOD),
     Case(

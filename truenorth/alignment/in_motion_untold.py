@@ -6,8 +6,10 @@ know that: with each correction the columns of biases, which are fixed to the bo
 that passes for knowledge of both. A consumer IMU that drove S-turns knew its level to .3 deg and was up to ten of these off.
 
 So the heading is held: it is where north shall be, not an error. A pass so held finds level and biases as the turns between them
-tell, and the passes go on until the level that the next begins with is the one that it leads back to. What the earth's rate does
-tell of heading, and what a wrong one does to level, is then read from passes held at headings all round (ours).
+tell, and the passes go on until the level that the next begins with is the one that it leads back to. Each is linear about the
+biases of the one before. That they are about zero, as the specification says, is given to its end, so that it counts once: passes
+that begin about what was found, with the sigma of the specification, go as far from zero as the log lets them. What the earth's
+rate does tell of heading, and what a wrong one does to level, is then read from passes held at headings all round (ours).
 """
 
 from __future__ import annotations
@@ -16,19 +18,22 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.alignment.in_motion_level import with_level_biases
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import HEADINGS, Guess, led_back
 from truenorth.alignment.in_motion_task import MovingTask
-from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import likelihood_ratio, misfit
-from truenorth.state.layout import PHI
+from truenorth.state.layout import BA, BG, DV, PHI
 from truenorth.state.limits import limit
 from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
 
 UNTOLD = math.radians(20.0)  # one sigma of heading: products of it with a tilt are no small part of the tilt
 HELD = math.radians(0.1)  # one sigma of a heading that is held: it moves by less than errors of second order
@@ -77,7 +82,30 @@ def with_heading_held(task: MovingTask, found: Pass, first: Guess) -> tuple[Pass
 
 
 def _held(task: MovingTask, guess: Guess) -> Pass:
-    return begun(task, guess, task.run(guess, gated=True))
+    centre = np.concatenate([guess.gyro_bias, guess.accel_bias])
+    return begun(task, guess, about_zero(task.run(guess, gated=True), centre, task.spec.constant_variance))
+
+
+def about_zero(track: Track, centre: Array, variance: Array) -> Track:
+    """A track that began with biases about a centre, as if it had begun with them about zero.
+
+    The prior's density about zero is that about b, times ``exp(-b' x / sigma^2)`` and a constant, x the error of b: linear in x. So
+    covariances stay as they are, and each state moves by its covariance with the biases times ``-b / sigma^2``.
+
+    Parameters
+    ----------
+    track : Track
+    centre : (6,) array
+        Biases of gyros and accelerometers that it began about, SI.
+    variance : (6,) array
+        That it began with.
+    """
+    pull = np.divide(-centre, variance, out=np.zeros(6), where=variance > 0.0)
+    x = track.P[:, :, BG.start : BA.stop] @ pull
+    C_nb = np.stack([dcm_from_rotation_vector(phi) @ C for phi, C in zip(x[:, PHI], track.C_nb, strict=True)])
+    sensors = track.sensors.copy()
+    sensors[:, BG.start :] += x[:, BG.start :]
+    return replace(track, C_nb=C_nb, v_n=track.v_n - x[:, DV], sensors=sensors)
 
 
 def _moved(before: Track, after: Track) -> float:
