@@ -19,6 +19,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_ro
 from truenorth.core.compiled import compiled
 from truenorth.core.position import Position
 from truenorth.errors.arm import SLOWEST_SEA
+from truenorth.errors.matrices import matrices_of, without_errors
 from truenorth.errors.staying import (
     BA,
     BG,
@@ -33,7 +34,7 @@ from truenorth.errors.staying import (
 )
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import ROUGHLY, Filtered, Settled, in_sigmas, settle
-from truenorth.estimate.staying import StayingLog, prior_of
+from truenorth.estimate.staying import KnownSensors, StayingLog, prior_of
 from truenorth.filters.gains import Gains, filter_gains, initial_part
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -185,6 +186,15 @@ class CoarseStart(NamedTuple):
     P_bias: Array  # (6, 6): prior covariance of the biases about zero
     interval: float  # s; of the filter
     rows_at: Array | None = None  # (M,) int: rows after which the integrated attitude is wanted
+    sensors: KnownSensors | None = None  # coarse errors, to take off to begin with
+
+    def right_record(self) -> ImuRecord:
+        """The record without the coarse errors of its sensors."""
+        if self.sensors is None:
+            return self.record
+        x = self.sensors.mean
+        off = matrices_of(x[6:]) if len(x) > 6 else (np.zeros((3, 3)),) * 2
+        return without_errors(self.record, x[:6], *off)
 
 
 def fine_align(
@@ -225,7 +235,7 @@ def settle_fine(
     history: bool = True,
 ) -> tuple[StayingLog, Settled[Filtered], Array]:
     """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains (or a history) are not wanted."""
-    record, C_n0_i, position, model, P_bias, interval, rows_at = start
+    record, C_n0_i, position, model, P_bias, interval, rows_at, _ = start
     arm_sigma = ARM_PRIOR if sways else TURN_ARM
     arm = None if turned is None and not sways else np.zeros(3)
     # Of a log that short the slow turn is a bend, which an arm that waves show would make a bent course, and a tilt, of.

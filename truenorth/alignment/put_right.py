@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import SENSORS, seen_of
+from truenorth.alignment.coarse_sensors import known_sensors
 from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.matched import innovations_of, whitened
 from truenorth.alignment.swaying import UNKNOWN_ARM, Mount, SwayAlignment, sway_align, usual_sway
@@ -58,7 +59,10 @@ def aligned_anew(
     about = start._replace(C_n0_i=fine.C_n0_i)
 
     def again(record: ImuRecord, wide: ImuSpec | None = None) -> SwayAlignment:
-        return align(about._replace(record=record), mount, wide or turned, axes)
+        other = about._replace(record=record)
+        if about.sensors is not None and mount.C_sb is not None:
+            other = other._replace(sensors=known_sensors(other, mount.C_sb, wide or turned))
+        return align(other, mount, wide or turned, axes)
 
     return again
 

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.alignment.accel_scale import accel_scale_evidence
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
+from truenorth.alignment.coarse_sensors import calibrated
 from truenorth.alignment.encoder_angles import angles_at, carried_angles
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
@@ -142,7 +143,7 @@ def align_rotary(
     C_n0_i = oba(coarse, position.lat, position.alt, history=False).C_n0_i
     own = method if method in FADING else "swaying"
     tell(f"aligning: {own}")
-    P_bias = np.diag(spec.bias_variance)
+    model, P_bias = StaticModel.of(spec), np.diag(spec.bias_variance)
     if encoder is None:
         mount = Mount(np.zeros(3), offset_sigma)  # along the IMU's axes
     else:
@@ -150,7 +151,7 @@ def align_rotary(
         angles = angles_at(carried.record, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb, offset_sigma)
-    start = CoarseStart(record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows)
+    start = calibrated(CoarseStart(record, C_n0_i, position, model, P_bias, task.interval, rows), mount, _turned(spec))
     if own in FADING:
         arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval)
         fine, unsure = faded_align(start, own, arm), 0.0

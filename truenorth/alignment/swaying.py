@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -47,6 +47,7 @@ WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
 FILTER_PASSES = 24  # of gyros with a bias of some earth rates that turn on an indexer; the others settle in five
+POOR_PASSES = 60  # of such gyros whose heading is known to 40 deg: it goes on by some degrees a pass
 FITS = 5  # of the motion, one a pass: another would make 13 of 14 logs no likelier
 
 
@@ -166,7 +167,7 @@ def swinging(plain: SwayAlignment, start: CoarseStart, mount: Mount, turned: Imu
         log.interval,
         start.rows_at,
         integrals=log.integrals,
-        sways=True,
+        sways=log.sways,
         C_sb=mount.C_sb,
         taken=np.append(log.taken, np.zeros(len(prior.mean) - len(log.taken))),
     )
@@ -182,7 +183,7 @@ def misfit_at(start: CoarseStart, mount: Mount, turned: ImuSpec | None, position
     cannot have. Nor can they have axes that are taken for perfect: on a raft that turns by 20 deg those of a tactical IMU made the
     other hemisphere likelier by 84, and by none as states. Parameters as in :func:`sway_align`; `start` may be of another place.
     """
-    C_n0_i = oba(integrate(start.record, start.interval), position.lat, position.alt, history=False).C_n0_i
+    C_n0_i = oba(integrate(start.right_record(), start.interval), position.lat, position.alt, history=False).C_n0_i
     log, estimator = _with_motion(start._replace(C_n0_i=C_n0_i, position=position), mount, turned, FITS)
     last = settle(log, estimator, estimator.moved, most=FILTER_PASSES, least=1 + FITS)
     return -2.0 * float(last.found.estimates.log_likelihood)
@@ -200,7 +201,9 @@ def _with_motion(
 
 def _filtered(log: StayingLog, estimator: MotionFilter, misfit: Callable[[Position], float]) -> SwayAlignment:
     """The log about its last pass."""
-    last = settle(log, estimator, estimator.moved, most=FILTER_PASSES, least=2)
+    last = settle(log, estimator, estimator.moved, most=FILTER_PASSES if log.sways else POOR_PASSES, least=2)
+    if not log.sways:  # its passes believe what the sway shows of the sensors: the answer does not
+        last = replace(last, found=estimator(log.averaged()))
     position, arm = log.position, log.prior.groups["arm"]
     # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
     seen = own_motion(log.integrals, log.C_n0_i, position.lat, position.alt)
@@ -258,7 +261,7 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
     The fit knows no random walk. Of gyros that make a large one it takes the wander for signal, and its passes may run away:
     then the log is fitted with as little weight as the walk leaves it.
     """
-    record, C_n0_i, position, model, _, interval, rows_at = start
+    record, C_n0_i, position, model, _, interval, rows_at, sensors = start
     prior = _prior(start, mount, turned)
     g = gravity_of_place(position.lat, position.alt)
     walked = math.sqrt(record.duration / 3.0) * math.hypot(
@@ -268,9 +271,14 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
     def turn(found: _Fitted) -> float:
         return float(np.max(np.abs(found.end[PHI])))
 
-    for speed in (BASE_VELOCITY, max(BASE_VELOCITY, walked)):
-        log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, sways=True, C_sb=mount.C_sb)
-        last = settle(log, partial(_fitted, speed), turn, enough=SMALL_TURN, most=WINDOWED_PASSES)
+    speeds, most = [BASE_VELOCITY, max(BASE_VELOCITY, walked)], WINDOWED_PASSES
+    if sensors is not None:  # such gyros walk that far
+        speeds, most = speeds[1:], FILTER_PASSES
+    for speed in speeds:
+        log = StayingLog(
+            record, C_n0_i, position, model, prior, interval, rows_at, sways=sensors is None, C_sb=mount.C_sb
+        )
+        last = settle(log, partial(_fitted, speed), turn, enough=SMALL_TURN, most=most)
         if last.moved < DIVERGED:
             break
     return log, last.found.residual
@@ -282,7 +290,7 @@ def _fitted(base_velocity: float, system: LinearSystem) -> _Fitted:
 
 
 def _prior(start: CoarseStart, mount: Mount, turned: ImuSpec | None, slow_arm: float = 0.0) -> Prior:
-    return prior_of(
+    prior = prior_of(
         start.P_bias,
         spec=turned,
         arm=mount.arm,
@@ -290,3 +298,4 @@ def _prior(start: CoarseStart, mount: Mount, turned: ImuSpec | None, slow_arm: f
         offset_sigma=mount.offset_sigma,
         slow_arm_sigma=slow_arm,
     )
+    return prior if start.sensors is None else prior.with_sensors(start.sensors)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.core.attitude import skew
+from truenorth.core.attitude import rotation_vector_from_dcm, skew
 
 Array = NDArray[np.float64]
 
@@ -42,3 +42,14 @@ def axis_rotation(axis: Array, angle: Array) -> Array:
     """``exp(angle [axis x])``, (..., 3, 3)."""
     K = skew(axis)
     return np.eye(3) + np.sin(angle)[..., None, None] * K + (1.0 - np.cos(angle))[..., None, None] * (K @ K)
+
+
+def indexer_turns(C_sb: Array) -> Array:
+    """Rotation vector (K, 3) of the IMU in the body from each epoch to the next, the IMU's axes, rad.
+
+    Parameters
+    ----------
+    C_sb : (K+1, 3, 3) array
+        Attitude of the body in the IMU.
+    """
+    return rotation_vector_from_dcm(C_sb[:-1] @ np.swapaxes(C_sb[1:], 1, 2))

@@ -20,16 +20,22 @@ from truenorth.core.remembered import remembered
 from truenorth.errors.staying import DV, PHI, grown, local_axes
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
-from truenorth.strapdown.inertial import InertialIntegrals
+from truenorth.strapdown.inertial import InertialIntegrals, gravity_velocity
 from truenorth.strapdown.level import increments, inertial_integrals
 
 Array = NDArray[np.float64]
 
 MATRICES = 18
+Moments = tuple[list[Array], list[Array]]
 
 
 def with_matrices(
-    system: LinearSystem, record: Callable[[], ImuRecord], integrals: InertialIntegrals, C_n0_i: Array, lat: float
+    system: LinearSystem,
+    record: Callable[[], ImuRecord],
+    integrals: InertialIntegrals,
+    C_n0_i: Array,
+    lat: float,
+    moments: Moments | None = None,
 ) -> LinearSystem:
     """A system of :meth:`truenorth.errors.staying.StaticModel.linearise` with the matrices of both sensors as 18 more states.
 
@@ -41,10 +47,13 @@ def with_matrices(
         Of that record.
     C_n0_i : (3, 3) array
     lat : float, rad
+    moments : Moments, optional
+        By which the matrices act (:func:`smooth_moments`); those of the record when left out.
     """
     T = integrals.intervals[:, None, None]
-    gyro, accel = moments = _about(integrals).get("moments") or _moments(record(), integrals)
-    _about(integrals)["moments"] = moments
+    if moments is None:
+        moments = _about(integrals)["moments"] = _about(integrals).get("moments") or _moments(record(), integrals)
+    gyro, accel = moments
     C_n_n0 = local_axes(integrals.time, lat)
     force = system.Phi[:, DV, PHI] / T  # [f x], f the reaction to gravity
     n, K = system.states, len(T)
@@ -62,6 +71,33 @@ def with_matrices(
     return system.with_made(**bigger)
 
 
+def smooth_moments(slow: InertialIntegrals, turns: Array, C_n0_i: Array, lat: float, alt: float) -> Moments:
+    """What the matrices act by where a base does nothing but stay: an indexer's rate, and gravity's reaction.
+
+    Parameters
+    ----------
+    slow : InertialIntegrals
+        With the attitude by which biases act (:func:`truenorth.errors.sway.without_sway`).
+    turns : (K, 3) array, rad
+        Of the IMU in the base over each interval, the IMU's axes.
+    C_n0_i : (3, 3) array
+    lat, alt : float, rad and m
+
+    Returns
+    -------
+    gyro, accel : lists of (K, 3, 3, 3) arrays
+        ``int s^m C_ib e_i w_j ds`` of each interval for m = 0, 1, 2, and of the force for m = 0, 1.
+    """
+    T, C = slow.intervals[:, None], slow.C_mean
+    f_n0 = -np.diff(gravity_velocity(slow.time, lat, alt), axis=0) / T
+    f = np.einsum("kji,kj->ki", C_n0_i @ C, f_n0)
+
+    def of(x: Array, order: int) -> Array:
+        return np.einsum("kai,kj->kaij", C, x * T ** (order + 1) / (order + 1))
+
+    return [of(turns / T, m) for m in range(3)], [of(f, m) for m in range(2)]
+
+
 def without_errors(record: ImuRecord, bias: Array, gyro_matrix: Array, accel_matrix: Array) -> ImuRecord:
     """A record with biases (6,) and matrices (3, 3) of the sensors taken off, as increments."""
     dtheta, dvel = increments(record)
@@ -74,9 +110,6 @@ def without_errors(record: ImuRecord, bias: Array, gyro_matrix: Array, accel_mat
 def matrices_of(x: Array) -> tuple[Array, Array]:
     """``M_g``, ``M_a`` (3, 3) of 18 states."""
     return x[:9].reshape(3, 3), x[9:].reshape(3, 3)
-
-
-Moments = tuple[list[Array], list[Array]]
 
 
 @remembered

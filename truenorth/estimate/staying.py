@@ -8,17 +8,19 @@ of its indexer, along its own axes, and ``rate``, the earth's level rate of an I
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.indexing import indexer_turns
 from truenorth.core.position import Position
 from truenorth.core.remembered import remembered
 from truenorth.errors.arm import arm_rows, slow_arm_rows, with_arm
 from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
-from truenorth.errors.matrices import MATRICES, matrices_of, with_matrices, without_errors
+from truenorth.errors.matrices import MATRICES, Moments, matrices_of, smooth_moments, with_matrices, without_errors
 from truenorth.errors.staying import BG, BIASES, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
 from truenorth.errors.sway import without_sway
 from truenorth.filters import LinearSystem
@@ -35,6 +37,13 @@ WIDEST = 1.0  # rad, by which a pass turns heading
 VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
 
 
+class KnownSensors(NamedTuple):
+    """Errors of the sensors as something has shown them besides a specification."""
+
+    mean: Array  # (6,) biases of gyros and accelerometers, or (24,) with the matrices of both behind
+    P: Array  # (6, 6) or (24, 24)
+
+
 @dataclass(frozen=True)
 class Prior:
     """What is known of attitude, velocity and sensors before the log."""
@@ -47,6 +56,12 @@ class Prior:
     def sensors(self) -> slice:
         """Biases and, where they are states, the matrices: what can be taken off a record."""
         return slice(BIASES.start, self.groups.get("matrices", BIASES).stop)
+
+    def with_sensors(self, known: KnownSensors) -> Prior:
+        """With what is known of the sensors besides."""
+        mean, P, s = self.mean.copy(), self.P.copy(), self.sensors
+        mean[s], P[s, s] = known
+        return replace(self, mean=mean, P=P)
 
 
 def prior_of(
@@ -197,15 +212,29 @@ class StayingLog:
 
     def linearise(self) -> LinearSystem:
         """The system of the errors that are left; of the base's own motion R holds the least that it can be."""
-        lat, alt, groups = self.position.lat, self.position.alt, self.prior.groups
-        blind = "rate" in groups  # gyros that do not see the earth turn know no slow turn about the vertical
+        blind = "rate" in self.prior.groups  # gyros that do not see the earth turn know no slow turn about the vertical
         slow = without_sway(self.integrals, self.C_sb, straight=blind) if self.sways else self.integrals
+        return self._system(slow)
+
+    def averaged(self) -> LinearSystem:
+        """The same system of an IMU on an indexer, where a sway shows no error of a sensor: neither a bias nor the matrices.
+
+        About an attitude that is good already. It is no derivative of what a pass does: of biases and scale factors that act
+        nearly as one it takes the difference, which its attitude without sway has wrong, and passes by it may run away.
+        """
+        slow, C_sb = without_sway(self.integrals, self.C_sb), self.C_sb
+        turns = indexer_turns(C_sb) if C_sb is not None else np.zeros((len(slow.intervals), 3))
+        return self._system(slow, smooth_moments(slow, turns, self.C_n0_i, self.position.lat, self.position.alt))
+
+    def _system(self, slow: InertialIntegrals, moments: Moments | None = None) -> LinearSystem:
+        """With the attitude by which biases act, and what the matrices act by."""
+        lat, alt, groups = self.position.lat, self.position.alt, self.prior.groups
         P0 = self.prior.P
         system = core_system(
             self.noise, slow, self.integrals, self.C_n0_i, self.position, P0[:STATES, :STATES], self.form
         )
         if "matrices" in groups:
-            system = with_matrices(system, self.right_record, self.integrals, self.C_n0_i, lat)
+            system = with_matrices(system, self.right_record, self.integrals, self.C_n0_i, lat, moments)
             self._turns = system.Phi[:, PHI, groups["matrices"]]
         if "arm" in groups:
             rows = arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)
