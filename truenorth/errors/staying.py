@@ -205,7 +205,7 @@ def _known_of(model: StaticModel, times: bytes, lat: float, alt: float) -> _Know
 def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
     """(K, 3) mean velocity over each interval that the INS computes in ``n0``, m/s; zero for a perfect one at rest."""
     p = integrals.position @ C_n0_i.T + gravity_position(integrals.time, lat, alt)
-    return np.diff(p, axis=0) / integrals.intervals[:, None]
+    return np.asarray((p[1:] - p[:-1]) / integrals.intervals[:, None])
 
 
 def gravity_force(time: Array, lat: float, alt: float) -> tuple[Array, Array]:
@@ -221,7 +221,8 @@ def sampled_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, al
 
 def gained_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
     """(K, 3) velocity that the INS gains in each interval in ``n0``, m/s; zero for a perfect one at rest."""
-    return np.diff(sampled_velocity(integrals, C_n0_i, lat, alt), axis=0)
+    v = sampled_velocity(integrals, C_n0_i, lat, alt)
+    return np.asarray(v[1:] - v[:-1])
 
 
 def local_axes(time: Array, lat: float) -> Array:
