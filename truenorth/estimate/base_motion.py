@@ -133,8 +133,8 @@ class VelocityNoise:
         coloured: bool = True,
     ) -> None:
         self.R, self.most, self.history = R, most, history
-        whole = len(parts) == 1 and parts[0].all()
-        self.rows: list[Any] = [slice(None)] if whole else list(parts)  # of each part
+        self.whole = len(parts) == 1 and bool(parts[0].all())
+        self.rows: list[Any] = [slice(None)] if self.whole else list(parts)  # of each part
         self.colours = (False, True) if coloured else (False,)
 
     def __call__(self, quiet: LinearSystem) -> Filtered:
@@ -164,7 +164,8 @@ class VelocityNoise:
         return kalman(system, history="full" if self.history else "last", innovations=True)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
-        R = np.empty((len(self.R), 3, 3))
-        R[:] = quiet.R
-        R.reshape(len(R), -1)[:, ::4] += self.R - QUIETEST_BASE**2  # its diagonal
+        own = self.R[:1] if self.whole else self.R
+        R, more = np.empty((len(self.R), 3, 3)), np.zeros((len(own), 3, 3))
+        more.reshape(len(more), -1)[:, ::4] = own - QUIETEST_BASE**2  # its diagonal
+        np.add(quiet.R, more, out=R)
         return quiet.with_made(R=R)

@@ -243,7 +243,7 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
     within = np.arange(seconds) - first
     half = width // 2
     halves = _medians(signal, half)
-    early, late = halves[:, first], halves[:, first + (width - half)]
+    early, late = halves.take(first, axis=1), halves.take(first + (width - half), axis=1)
     line = early + (late - early) * (within - (half - 1) / 2.0) / (width - half)
     return _running_median(signal), line
 
@@ -251,7 +251,7 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
 def _running_median(signal: Array) -> Array:
     """(3, m) median of the 31 s around each second."""
     width = min(LEVEL_WINDOW, signal.shape[1])
-    return _medians(signal, width)[:, offset(signal.shape[1], width)]
+    return _medians(signal, width).take(offset(signal.shape[1], width), axis=1)
 
 
 def _medians(signal: Array, width: int) -> Array:
@@ -295,7 +295,7 @@ def box_mean(signal: Array, width: int) -> Array:
     """(k, m) mean over `width` seconds around each second; at the ends over the last `width` that fit."""
     seconds = signal.shape[1]
     width = min(width, seconds)
-    return np.asarray(_neighbours(signal, width)[:, offset(seconds, width)] / width)
+    return np.asarray(_neighbours(signal, width).take(offset(seconds, width), axis=1) / width)
 
 
 def _neighbours(signal: Array, count: int) -> Array:
