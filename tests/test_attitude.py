@@ -182,3 +182,9 @@ def test_kernels_as_scipy(p, q, v, scale):
     np.testing.assert_allclose(turned, P.apply(v), atol=ROUNDING)
     np.testing.assert_allclose(unit, q, atol=1e-15)
     np.testing.assert_allclose(crossed, np.cross(v, p[1:]), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_the_length_of_a_vector_is_numpys_to_the_bit(scale):
+    for v in scale * np.random.default_rng(3).standard_normal((200, 3)):
+        assert attitude.length_of(v) == np.linalg.norm(v)

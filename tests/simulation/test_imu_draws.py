@@ -14,6 +14,7 @@ from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import given_errors, ideal_log, rest, simulate, simulate_runs
 from truenorth.simulation.imu_errors import apply_errors
 from truenorth.simulation.streams import STREAMS
+from truenorth.simulation.true_errors import drawn_errors
 
 PLACE = Position.from_degrees(40.0, 118.0)
 EVERYTHING = imu_spec(Path(__file__).parents[2] / "examples" / "imu_every_term.yaml")
@@ -164,3 +165,13 @@ def test_given_errors_in_datasheet_units():
 def test_mistakes_in_given_errors_are_named(content, said):
     with raises_naming(DataError, *said):
         given_errors(content, "file")
+
+
+def test_misalignments_are_drawn_without_a_diagonal_and_one_run_does_not_touch_another():
+    spec = imu_spec("tactical")
+    first, second = (drawn_errors(spec, seed=1, run=run) for run in (1, 2))
+    assert np.all(np.diag(first.gyro.misalignment) == 0.0)
+    assert first.gyro.misalignment.any()
+    kept = first.gyro.bias.copy()
+    second.gyro.bias[:] = 0.0
+    np.testing.assert_array_equal(drawn_errors(spec, seed=1, run=1).gyro.bias, kept)

@@ -83,8 +83,8 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = F
     if sways:
         covariance = covariance + creep(task, fine.integrals.time[1:])
     e = fine.estimates
-    bias, variance = fine.taken[BIASES] + e.x[:, BIASES], np.einsum("kii->ki", e.P[:, BA, BA])
-    prior = np.diag(fine.system.P0)[BA]
+    bias, variance = fine.taken[BIASES] + e.x[:, BIASES], e.P[:, BA, BA].diagonal(axis1=1, axis2=2)
+    prior = fine.system.P0.diagonal()[BA]
     accel_bias, accel_sigma = true_bias(bias[:, 3:], variance, prior, used.bias_variance[3:])
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],
@@ -99,7 +99,7 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = F
         accel_bias=accel_bias,
         accel_bias_sigma=accel_sigma,
         innovation=e.innovation,
-        innovation_sigma=np.sqrt(np.einsum("kii->ki", e.innovation_covariance)),
+        innovation_sigma=np.sqrt(e.innovation_covariance.diagonal(axis1=1, axis2=2)),
         nis=e.nis,
     )
 
@@ -112,7 +112,7 @@ def pays_until(history: History, answer: Alignment, fine: FineAlignment) -> floa
     floor = math.sqrt(answer.phi_floor[2, 2])
     elapsed = history.time - fine.integrals.start
     random = np.sqrt(np.maximum(history.phi_covariance[:, 2, 2] - history.phi_floor[:, 2, 2], 1e-20))
-    below = np.flatnonzero(random < 0.5 * floor)
+    below = (random < 0.5 * floor).nonzero()[0]
     if below.size:
         return float(elapsed[below[0]])
     half = len(elapsed) // 2

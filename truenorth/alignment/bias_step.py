@@ -22,7 +22,7 @@ from truenorth.alignment.passing_turn import passing_turns
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.alignment.usual import usual
-from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.attitude import length_of, rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.staying import BA, BG, PHI
@@ -154,14 +154,16 @@ def turn_evidence(task: Task) -> list[Evidence]:
     if turns.any():
         turns = np.convolve(turns, np.ones(2 * AWAY + 1), "same") > 0.0
     found = []
-    edges = [0, *(np.flatnonzero(turns[1:] != turns[:-1]) + 1).tolist(), len(turns)]
+    edges = [0, *((turns[1:] != turns[:-1]).nonzero()[0] + 1).tolist(), len(turns)]
     for begin, end in pairwise(edges):
         part = slice(begin, end)
         if end - begin < FEWEST or turns[begin]:
             continue
         up = motion.specific_force[part].mean(axis=0)
-        rate = motion.rate[part] @ (up / np.linalg.norm(up))
-        step = find_touch(motion.time[part], np.stack([rate, 0.0 * rate], axis=1), 0.0)
+        rate = motion.rate[part] @ (up / length_of(up))
+        along = np.zeros((end - begin, 2))
+        along[:, 0] = rate
+        step = find_touch(motion.time[part], along, 0.0)
         found += [step] if step is not None and _stays(step, motion.time[part], rate) else []
     if not found:
         return []
@@ -189,15 +191,15 @@ def gravity_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
     force -= task.gravity * tilt
     b = time @ force / (time @ time)
     left = force - force.mean(axis=0) - np.outer(time, b)
-    variance = np.sum(left**2, axis=0) / ((count - 2.0) * (time @ time))
+    variance = (left**2).sum(axis=0) / ((count - 2.0) * (time @ time))
     span = float(motion.time[-1] - motion.time[0])
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
     wanders = max(spec.gyro_bias_instability, usual("gyro", "bias_instability", spec.gyro_random_walk))
     # Two values of a bias that wanders, far apart, differ by its instability times sqrt(2). A gyro that wanders tilts what it
     # carries.
     carried = task.gravity**2 * (steady**2 + wanders**2)
-    ratio = float(np.sum((span * b) ** 2 / (span**2 * (variance + carried) + 2.0 * instability**2)))
-    moved = span * float(np.linalg.norm(b))  # m/s^2
+    ratio = float(((span * b) ** 2 / (span**2 * (variance + carried) + 2.0 * instability**2)).sum())
+    moved = span * length_of(b)  # m/s^2
     if ratio <= limit("drift"):
         return []
     heading = abs(float(b[1])) / (task.gravity * EARTH_RATE * math.cos(task.position.lat))
@@ -223,7 +225,7 @@ def tilted(task: Task, C_nb: Array) -> tuple[Array, Array]:
     count = len(angle) // DRIFT_BLOCK
     level = np.stack([-angle[:, 1], angle[:, 0]], axis=1)
     tilt = level[: count * DRIFT_BLOCK].reshape(count, DRIFT_BLOCK, 2).mean(axis=1)
-    d = np.diff(tilt, axis=0)
+    d = tilt[1:] - tilt[:-1]
     steady = median_of_rows(d.T)[:, 0]
     scatter = median_of_rows(np.abs(d - steady).T)[:, 0] / 0.6745
     # A median of normal values scatters by sqrt(pi/2) times what their mean does.

@@ -20,6 +20,7 @@ from truenorth.alignment.task import Task
 from truenorth.alignment.usual import wandering_as_usual
 from truenorth.analysis.student import as_normal
 from truenorth.coarse.analytic import BLOCKS, Means
+from truenorth.core.attitude import length_of
 from truenorth.core.earth import EARTH_RATE, gravity_of_place
 from truenorth.errors.staying import BA, BG, BIASES, STATES, StaticModel, mean_velocity
 from truenorth.errors.walks import Walks
@@ -35,6 +36,9 @@ LOST_HEADING = math.radians(20.0)  # that the scatter of a still base's mean rat
 BLIND_RATE = math.radians(5.0) / 3600.0  # rad/s: a mean rate this far from the earth's holds no heading
 LOOSE_GYRO, LOOSE_ACCEL = math.radians(10.0) / 3600.0, 0.5  # rad/s, m/s^2: priors that let the log speak
 HELD_GYRO, HELD_ACCEL = 1e-3 * LOOSE_GYRO, 1e-3 * LOOSE_ACCEL
+# Along east, north and up: loose where the log can answer, held where tilt or heading would take the blame.
+FREE_GYRO = np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2])
+FREE_ACCEL = np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2])
 
 
 @dataclass(frozen=True)
@@ -71,11 +75,11 @@ def _sigmas(residual: float, noise: float, dof: float, bias: float) -> float:
 
 def check_means(m: Means, lat: float, g: float) -> LogCheck:
     """What the means of a still base tell of the biases."""
-    f = float(np.linalg.norm(m.f_b))
+    f = length_of(m.f_b)
     up = m.f_b / f
     w_up = float(m.w_ib_b @ up)
     level = m.w_ib_b - w_up * up
-    w_level = float(np.linalg.norm(level))
+    w_level = length_of(level)
     north = level / w_level if w_level > 0 else np.zeros(3)
     return LogCheck(
         rate_residual=np.array([w_level - EARTH_RATE * math.cos(lat), w_up - EARTH_RATE * math.sin(lat)]),
@@ -94,11 +98,10 @@ def check_filter(
 
     The random walks are fitted about the usual ones, unless they are known.
     """
-    # Loose where the log can answer, held where tilt or heading would take the blame.
     C_n_b = C_n0_i.T
     P = np.zeros((6, 6))
-    P[:3, :3] = C_n_b @ np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2]) @ C_n_b.T
-    P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
+    P[:3, :3] = C_n_b @ FREE_GYRO @ C_n_b.T
+    P[3:, 3:] = C_n_b @ FREE_ACCEL @ C_n_b.T
     noise = usual if known is None else known
     start = CoarseStart(task.record, C_n0_i, task.position, noise, P, task.interval)
     sways = task.motion.overall != "still"
@@ -115,7 +118,7 @@ def check_filter(
     slope = gravity_of_place(lat, task.position.alt + 1.0) - task.gravity
     check = LogCheck(
         rate_residual=rate[1:],
-        rate_noise=np.sqrt(np.diag(rate_P)[1:]),
+        rate_noise=np.sqrt(rate_P.diagonal()[1:]),
         force_residual=float(force[2]),
         force_noise=float(np.hypot(np.sqrt(force_P[2, 2]), slope * task.position.vertical_sigma)),
     )
@@ -194,7 +197,7 @@ def implied(check: LogCheck, bias: Array, P: Array, P0: Array) -> LogCheck:
     P, P0 : (3, 3) arrays, (rad/s)^2
         Its covariance, after and before.
     """
-    after, before = np.diag(P)[1:], np.diag(P0)[1:]
+    after, before = P.diagonal()[1:], P0.diagonal()[1:]
     if not before.all():  # a filter that takes gyros for free of bias implies none
         return check
     seen = np.maximum(before - after, 1e-9 * before)
@@ -215,7 +218,7 @@ def is_blind(motion: MotionSummary, check: LogCheck) -> bool:
     """
     if motion.overall not in ("still", "disturbed") or motion.fraction("rotating") > 0.0:
         return False
-    noise = 5.0 * float(np.max(check.rate_noise))
+    noise = 5.0 * float(check.rate_noise.max())
     return float(np.hypot(*check.rate_residual)) > max(BLIND_RATE, noise)
 
 
@@ -230,7 +233,7 @@ def is_lost(task: Task, check: LogCheck, spec: ImuSpec | None, heading_limit: fl
         return False
     north = EARTH_RATE * math.cos(task.position.lat)
     lost = north * math.sin(LOST_HEADING)
-    if float(np.max(check.rate_noise)) > lost:
+    if float(check.rate_noise.max()) > lost:
         return True
     if inferred and spec is not None and math.sqrt(float(spec.bias_variance[0])) > lost:
         return True

@@ -26,7 +26,7 @@ class Epoch:
 
     def attitude(self, C_ib: Array) -> Array:
         """Attitude at the epoch, of the attitude after its row."""
-        return C_ib @ dcm_from_rotation_vector(self.turn)
+        return C_ib @ dcm_from_rotation_vector(self.turn) if self.turn.any() else C_ib
 
 
 def find_epoch(record: ImuRecord, at: float | None) -> Epoch:

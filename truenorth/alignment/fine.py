@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_rotation_vector, rotate
+from truenorth.core.attitude import dcm_from_rotation_vector, length_of, quaternion_from_rotation_vector, rotate
 from truenorth.core.compiled import compiled
 from truenorth.core.position import Position
 from truenorth.errors.arm import SLOWEST_SEA
@@ -141,8 +141,9 @@ class FineAlignment(Filtered):
         J = np.zeros((9, len(self.end)))
         J[PHI, PHI] = np.eye(3)
         J[PHI, BG] = self._turned_between(time)  # phi(t) = phi_end + int_t^end C_n0_b eps
-        behind, share = self._behind(time)
-        J[PHI, STATES:] = -np.einsum("k,kij->ij", share, self.system.Phi[behind, PHI, STATES:])
+        if len(self.end) > STATES:
+            behind, share = self._behind(time)
+            J[PHI, STATES:] = -np.einsum("k,kij->ij", share, self.system.Phi[behind, PHI, STATES:])
         J[3:6, BG] = J[6:9, BA] = np.eye(3)
         self._carried[:] = time, J
         return J
@@ -271,7 +272,8 @@ def left_over(elapsed: float) -> Callable[[Filtered], float]:
     """
 
     def left(found: Filtered) -> float:
-        turned = float(np.linalg.norm(found.end[PHI]) + np.linalg.norm(found.end[BG]) * elapsed)
+        end = found.end
+        turned = length_of(end[PHI]) + length_of(end[BG]) * elapsed
         asked = PHI if found.P[PHI, PHI][2, 2] < 1.0 else LEVEL
         return in_sigmas(asked)(found) * min(1.0, TURNED * turned)
 

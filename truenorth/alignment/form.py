@@ -54,7 +54,7 @@ def _portmanteau(x: Array) -> float:
     total = 0.0
     for e in np.ascontiguousarray((x - trend @ (trend.T @ x)).T):
         power = float(e @ e)
-        total += sum((float(e[lag:] @ e[:-lag]) / power) ** 2 / (count - lag) for lag in range(1, LAGS + 1))
+        total += sum([(float(e[lag:] @ e[:-lag]) / power) ** 2 / (count - lag) for lag in range(1, LAGS + 1)])
     return count * (count + 2) * total
 
 

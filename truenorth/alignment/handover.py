@@ -39,7 +39,7 @@ def hand_over(task: Task, fine: FineAlignment, answer: Alignment) -> Handover:
     deflected[6:] = answer.C_nb[:2].T * (DEFLECTION * task.gravity)
     P = turn @ P @ turn.T + deflected @ deflected.T
     P[:3, :3] = answer.phi_covariance
-    return Handover(answer.C_nb, fine.bias[3:], P, np.diag(fine.system.P0)[BIASES].copy())
+    return Handover(answer.C_nb, fine.bias[3:], P, fine.system.P0.diagonal()[BIASES].copy())
 
 
 def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
@@ -69,6 +69,6 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         velocity=integrals.velocity[-1].copy(),
         place=integrals.position[-1].copy(),
         x=fine.end[kept],
-        P=fine.P[np.ix_(kept, kept)],
+        P=fine.P[kept[:, None], kept],
         largest=block_limits(fine.estimates),
     )

@@ -83,8 +83,8 @@ def masked_evidence(fine: FineAlignment, spec: ImuSpec) -> list[Evidence]:
 def _follow_each_other(fine: FineAlignment) -> bool:
     """Whether innovations of the level axes are correlated with the next."""
     e = fine.estimates.innovation[:, :2]
-    power = np.sum(e**2, axis=0)
-    return bool(np.any(np.sum(e[1:] * e[:-1], axis=0) > limit("motion follows") * power))
+    power = (e**2).sum(axis=0)
+    return bool(((e[1:] * e[:-1]).sum(axis=0) > limit("motion follows") * power).any())
 
 
 def _likeliest(fine: FineAlignment, spec: ImuSpec, system: LinearSystem) -> tuple[Array, Array]:

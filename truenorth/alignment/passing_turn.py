@@ -39,6 +39,8 @@ def passing_turns(motion: MotionSummary) -> NDArray[np.bool_]:
     rests = motion.overall in ("still", "disturbed") and motion.still_fraction > 1.0 - MOSTLY
     if not rests or len(rate) < 2 * REST + 1:
         return none
+    if np.ptp(rate, axis=0).max() <= SHARED:  # no second is that far from the median
+        return none
     noise = median_of_rows(np.abs(rate[1:] - rate[:-1]).T)[:, 0] / 0.6745 / np.sqrt(2.0)
     turns = np.any(np.abs(rate - median_of_rows(rate.T)[:, 0]) > SHARED + FAR * noise, axis=1)
     if not turns.any() or turns.mean() > MOSTLY:

@@ -70,6 +70,7 @@ from truenorth.strapdown.inertial import integrate
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying", Published]
+METHODS = get_args(Method)
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
@@ -131,8 +132,8 @@ def align_base(
         Too short a log for any answer.
     """
     tell = progress or (lambda stage: None)
-    if method not in get_args(Method):
-        refuse(method, get_args(Method))
+    if method not in METHODS:
+        refuse(method, METHODS)
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     spec = None if imu is None else noise_in(record, imu_spec(imu)).with_coning_of(record)
@@ -180,8 +181,7 @@ def align_base(
     evidence = weighed_by_heave(found.heave, evidence, task.record)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     answer = judged(answer, evidence, heading_limit)
-    moved = found.moved
-    return answer if moved is None else replace(answer, disturbance=np.maximum(answer.disturbance, moved))
+    return answer if found.moved is None else replace(answer, disturbance=np.maximum(answer.disturbance, found.moved))
 
 
 @dataclass(frozen=True)
@@ -256,8 +256,7 @@ def _moves_on(task: Task, fine: FineAlignment) -> Array:
 
 
 def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogCheck, sound: bool) -> _Found:
-    lat, alt = task.position.lat, task.position.alt
-    rows = np.array([task.epoch.row])
+    lat, alt, rows = task.position.lat, task.position.alt, np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
     refined = method in ("kalman", "swaying", *FADING, *STATIONARY)
     if method == "inertial":
@@ -318,7 +317,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogChe
     del integrals, filtered, coarse  # of the first pass; what follows takes memory
     short = swings and not sways and task.record.duration <= BEND
     answer = answer_of(task, fine, used, where, P, sways, bent_by_heading(fine, lat) if short else None)
-    answer = replace(answer, ongoing=go_on(task, fine, StaticModel.of(used)))
+    answer = replace(answer, ongoing=go_on(task, fine, start.model))
     if turned is not None:  # the check knows no scale factors
         check = replace(check, rate_residual=np.zeros(2), rate_noise=np.full(2, math.inf))
     if spec is not None or turned is not None:
@@ -376,11 +375,12 @@ def answer_of(
     if bent is not None:
         answer = replace(answer, phi_covariance=answer.phi_covariance + bent)
         history = replace(history, phi_covariance=history.phi_covariance + bent)
-    accel_bias, accel_sigma = true_bias(fine.bias[3:], np.diag(fine.P)[BA], np.diag(P_bias)[3:], used.bias_variance[3:])
+    variance, prior = fine.P.diagonal(), P_bias.diagonal()[3:]
+    accel_bias, accel_sigma = true_bias(fine.bias[3:], variance[BA], prior, used.bias_variance[3:])
     return replace(
         answer,
         gyro_bias=fine.bias[:3],
-        gyro_bias_sigma=np.sqrt(np.diag(fine.P)[BG]),
+        gyro_bias_sigma=np.sqrt(variance[BG]),
         accel_bias=accel_bias,
         accel_bias_sigma=accel_sigma,
         disturbance=fine.disturbance,

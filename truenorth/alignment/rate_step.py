@@ -79,9 +79,9 @@ def _matched(rate: Array, share: float, instability: float) -> tuple[Array, Arra
     `share` of the mean square of neighbours' differences is the noise of a second.
     """
     shapes = _shapes(len(rate))
-    energy = np.sum(shapes**2, axis=0)[:, None]
+    energy = (shapes**2).sum(axis=0)[:, None]
     size = shapes.T @ (rate - rate.mean(axis=0)) / energy
-    noise = share * np.mean((rate[1:] - rate[:-1]) ** 2, axis=0)
+    noise = share * ((rate[1:] - rate[:-1]) ** 2).mean(axis=0)
     return size, size**2 / (noise / energy + 2.0 * instability**2)
 
 

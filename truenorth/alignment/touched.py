@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.attitude import length_of
 from truenorth.errors.whole_bias import time_average
 from truenorth.quality.signals import STILL_ANGLE, median_of_rows
 from truenorth.state.evidence import Evidence, contradiction
@@ -91,7 +92,7 @@ def find_touch(
     size = np.hypot(steps[:, 0], steps[:, 1])
     # Neighbouring blocks tell what is usual: a step is in few of their differences, and the median does not see it.
     usual = median_of_rows(np.abs(blocks[1:] - blocks[:-1]).T)[:, 0] / 0.6745 / math.sqrt(ASIDE)
-    scatter = float(np.linalg.norm(usual))
+    scatter = length_of(usual)
     # Means of m blocks, g blocks apart, of a walk of q a block differ by a variance of q (g + 2 m/3), from centre to centre m + g.
     block = length * float(time[-1] - time[0]) / max(len(time) - 1, 1)
     walk = angle_walk * math.sqrt(block * (GAP + 2.0 * ASIDE / 3.0))

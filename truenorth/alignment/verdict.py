@@ -63,7 +63,7 @@ def judged(
         raise no_attitude(answer.source)
     _, floor = azimuth_sigmas(answer)
     lat = answer.position.lat
-    bias = float(np.max(answer.gyro_bias_prior))
+    bias = float(answer.gyro_bias_prior.max())
     stays = answer.moving is None and answer.transfer is None
     verdict = judge(
         Claim(
@@ -163,10 +163,10 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
     times as large make k times as much of heading's floor at the most: of an IMU that was turned, next to nothing.
     """
     place, (_, floor) = answer.position, azimuth_sigmas(answer)
-    found = rate_evidence(check, float(np.max(answer.gyro_bias_prior)), place.lat, answer.imu_source, floor)
+    found = rate_evidence(check, float(answer.gyro_bias_prior.max()), place.lat, answer.imu_source, floor)
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
     g = gravity_of_place(place.lat, place.alt)
-    accel = math.hypot(float(np.max(answer.accel_bias_prior)), answer.imu.accel_scale_factor * g)
+    accel = math.hypot(float(answer.accel_bias_prior.max()), answer.imu.accel_scale_factor * g)
     if check.force_misses(accel) > limit("specification"):
         found.append(
             Evidence(
@@ -194,7 +194,7 @@ def _taken_to_stay(answer: Alignment) -> list[Evidence]:
 
 def base_speed(answer: Alignment) -> list[Evidence]:
     """That a base which stays would have to move as none does."""
-    speed = float(np.max(answer.disturbance[:2]))
+    speed = float(answer.disturbance[:2].max())
     return [contradiction("base.fast", speed=speed)] if speed > limit("fastest base") else []
 
 

@@ -148,17 +148,19 @@ def _errors(answer: Alignment, simulated: Simulation, true: MotionStates) -> Ite
     The squares, normalised by what the method says, are means over components: 1 where it says the truth.
     """
     phi = -rotation_vector_from_dcm(answer.C_nb @ true.C_nb.T)  # C_hat = (I - [phi x]) C
-    sigma = np.sqrt(np.diag(answer.phi_covariance))
+    sigma = np.sqrt(answer.phi_covariance.diagonal())
     usable = 3 if answer.heading_known else 2
-    for axis, name in enumerate(("phi_e", "phi_n", "phi_u")[:usable]):
-        yield name, float(phi[axis]) / ARCMIN, float(sigma[axis]) / ARCMIN, "arcmin"
+    angles = zip(("phi_e", "phi_n", "phi_u")[:usable], phi.tolist(), sigma.tolist(), strict=False)
+    for name, error, one in angles:
+        yield name, error / ARCMIN, one / ARCMIN, "arcmin"
     level = math.hypot(phi[0], phi[1]) / ARCMIN
     yield "level", level, math.hypot(sigma[0], sigma[1]) / ARCMIN, "arcmin"
     block = answer.phi_covariance[:usable, :usable]
     yield "nees", float(phi[:usable] @ np.linalg.solve(block, phi[:usable])) / usable, math.nan, "1"
     if answer.history is not None:
         count = max(1, int(np.isfinite(answer.history.innovation).sum()))
-        yield "nis", float(np.nansum(answer.history.nis)) / count, math.sqrt(2.0 / count), "1"
+        nis = answer.history.nis
+        yield "nis", float(np.where(np.isnan(nis), 0.0, nis).sum()) / count, math.sqrt(2.0 / count), "1"
     for what, found, spread, drawn, unit, scale in (
         ("gyro_bias", answer.gyro_bias, answer.gyro_bias_sigma, simulated.errors.gyro_bias, "deg/h", DEG_PER_HOUR),
         ("accel_bias", answer.accel_bias, answer.accel_bias_sigma, simulated.errors.accel_bias, "ug", MICRO_G),

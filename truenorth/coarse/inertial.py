@@ -98,7 +98,7 @@ def oba(
     b, r = _vectors(integrals, lat, alt, form)
     ends = np.arange(1, len(b))
     starts = ends // 2
-    db, dr = b[1:] - b[starts], r[1:] - r[starts]
+    db, dr = b[1:] - b.take(starts, axis=0), r[1:] - r.take(starts, axis=0)
     weights = np.ones(len(ends))
     K = np.cumsum(davenport_matrices(db, dr, weights), axis=0) if history else davenport_of(dr.T @ db)[None]
     found = rotation_from_davenport(K)

@@ -50,6 +50,11 @@ def dcm_from_rotation_vector(rotation: ArrayLike) -> Array:
     return np.eye(3) + np.sin(angle) / angle * S + 0.5 * (np.sin(0.5 * angle) / (0.5 * angle)) ** 2 * (S @ S)
 
 
+def length_of(v: Array) -> float:
+    """Length of one vector (n,): to the bit that of :func:`numpy.linalg.norm`, which takes longer to begin."""
+    return math.sqrt(v.dot(v))
+
+
 def rotation_vector_from_dcm(C: ArrayLike) -> Array:
     """Rotation vector (..., 3), rad, of at most pi, of a direction cosine matrix (..., 3, 3)."""
     return rotation_vector_from_quaternion(quaternion_from_dcm(C))

@@ -21,8 +21,9 @@ shakes the samples; the mean's tie to the states and to the process noise inside
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import skew
 from truenorth.core.compiled import borrowing, compiled
+from truenorth.core.remembered import remembered
 from truenorth.core.vectors import load3, load4, minus4, plus4, store3, store4, times4, zero4
 from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem
@@ -37,6 +39,9 @@ from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, grav
 
 Array = NDArray[np.float64]
 Form = Literal["velocity", "force"]
+OfNominal = Callable[
+    [InertialIntegrals, Array, float, float], Array
+]  # of a nominal attitude, at a latitude and an altitude
 
 PHI = slice(0, 3)
 DV = slice(3, 6)
@@ -202,10 +207,32 @@ def _known_of(model: StaticModel, times: bytes, lat: float, alt: float) -> _Know
     return _Known(f, f_late, C_n_n0, noise)
 
 
+def _known_about(work: OfNominal) -> OfNominal:
+    """Remember the last of the same integrals: a check, the choice of a form and a system ask for one about the same attitude."""
+
+    @remembered
+    def known(integrals: InertialIntegrals) -> dict[tuple[bytes, float, float], Array]:
+        return {}
+
+    @wraps(work)
+    def found(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
+        about, key = known(integrals), (C_n0_i.tobytes(), lat, alt)
+        velocity = about.get(key)
+        if velocity is None:
+            velocity = work(integrals, C_n0_i, lat, alt)
+            velocity.flags.writeable = False
+            about.clear()
+            about[key] = velocity
+        return velocity
+
+    return found
+
+
+@_known_about
 def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
-    """(K, 3) mean velocity over each interval that the INS computes in ``n0``, m/s; zero for a perfect one at rest."""
+    """(K, 3) mean velocity over each interval that the INS computes in ``n0``, m/s; zero for a perfect one at rest. Read-only."""
     p = integrals.position @ C_n0_i.T + gravity_position(integrals.time, lat, alt)
-    return np.diff(p, axis=0) / integrals.intervals[:, None]
+    return np.asarray((p[1:] - p[:-1]) / integrals.intervals[:, None])
 
 
 def gravity_force(time: Array, lat: float, alt: float) -> tuple[Array, Array]:
@@ -219,9 +246,11 @@ def sampled_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, al
     return np.asarray(integrals.velocity @ C_n0_i.T + gravity_velocity(integrals.time, lat, alt))
 
 
+@_known_about
 def gained_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
-    """(K, 3) velocity that the INS gains in each interval in ``n0``, m/s; zero for a perfect one at rest."""
-    return np.diff(sampled_velocity(integrals, C_n0_i, lat, alt), axis=0)
+    """(K, 3) velocity that the INS gains in each interval in ``n0``, m/s; zero for a perfect one at rest. Read-only."""
+    v = sampled_velocity(integrals, C_n0_i, lat, alt)
+    return np.asarray(v[1:] - v[:-1])
 
 
 def local_axes(time: Array, lat: float) -> Array:

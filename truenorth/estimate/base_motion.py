@@ -90,9 +90,9 @@ class _Bracket:
     def __init__(self) -> None:
         self.small, self.large = [0.0] * 3, [math.inf] * 3
 
-    def within(self, before: Array, asked: Array) -> Array:
-        """Where to go from a variance, (3,) each, of which another one is asked for."""
-        return np.array([self._of_axis(i, *pair) for i, pair in enumerate(zip(before.tolist(), asked.tolist()))])
+    def within(self, before: list[float], asked: list[float]) -> list[float]:
+        """Where to go from a variance, of three axes each, of which another one is asked for."""
+        return [self._of_axis(i, before[i], asked[i]) for i in range(3)]
 
     def _of_axis(self, i: int, before: float, asked: float) -> float:
         if asked > before:
@@ -133,8 +133,8 @@ class VelocityNoise:
         coloured: bool = True,
     ) -> None:
         self.R, self.most, self.history = R, most, history
-        whole = len(parts) == 1 and parts[0].all()
-        self.rows: list[Any] = [slice(None)] if whole else list(parts)  # of each part
+        self.whole = len(parts) == 1 and bool(parts[0].all())
+        self.rows: list[Any] = [slice(None)] if self.whole else list(parts)  # of each part
         self.colours = (False, True) if coloured else (False,)
 
     def __call__(self, quiet: LinearSystem) -> Filtered:
@@ -147,11 +147,12 @@ class VelocityNoise:
                 R, same = self.R.copy(), True
                 for rows, bracket in zip(self.rows, brackets, strict=True):
                     nu, covariance = estimates.innovation[rows], estimates.innovation_covariance[rows]
-                    before = self.R[rows][0]
-                    asked, expected = _variance_of(nu, covariance, before, colour)
+                    now = self.R[rows][0]
+                    asked, expected = (x.tolist() for x in _variance_of(nu, covariance, now, colour))
+                    before = now.tolist()
                     R[rows] = after = bracket.within(before, asked)
                     # The vertical carries no attitude.
-                    same &= bool((np.abs(after - before)[:2] < SAME_NOISE * expected[:2]).all())
+                    same &= all(abs(after[i] - before[i]) < SAME_NOISE * expected[i] for i in (0, 1))
                 if same:
                     break
                 self.R = R
@@ -163,6 +164,8 @@ class VelocityNoise:
         return kalman(system, history="full" if self.history else "last", innovations=True)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
-        R = np.array(np.broadcast_to(quiet.R, (len(self.R), 3, 3)))
-        R.reshape(len(R), -1)[:, ::4] += self.R - QUIETEST_BASE**2  # its diagonal
+        own = self.R[:1] if self.whole else self.R
+        R, more = np.empty((len(self.R), 3, 3)), np.zeros((len(own), 3, 3))
+        more.reshape(len(more), -1)[:, ::4] = own - QUIETEST_BASE**2  # its diagonal
+        np.add(quiet.R, more, out=R)
         return quiet.with_made(R=R)

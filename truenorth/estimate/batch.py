@@ -87,7 +87,7 @@ class Settled(Generic[E]):
 
 def in_sigmas(states: slice) -> Callable[[Filtered], float]:
     """The largest of these states in units of its sigma: a measure for :func:`settle`."""
-    return lambda found: float(np.max(np.abs(found.end[states]) / np.sqrt(np.diag(found.P)[states])))
+    return lambda found: float((np.abs(found.end[states]) / np.sqrt(found.P.diagonal()[states])).max())
 
 
 def settle(

@@ -180,7 +180,7 @@ def block_limits(estimates: Estimates) -> Array:
 
 def _sizes(estimates: Estimates, length: int) -> Array:
     """(B, 2) of each block of so many epochs: sum of the squared innovations, and squares of their sums, in sigmas."""
-    e = estimates.innovation / np.sqrt(np.einsum("kii->ki", estimates.innovation_covariance))
+    e = estimates.innovation / np.sqrt(estimates.innovation_covariance.diagonal(axis1=1, axis2=2))
     blocks = len(e) // length
     e = e[: blocks * length]
     flat, sums = e.reshape(blocks, -1), np.ones(length) @ e.reshape(blocks, length, -1)

@@ -16,6 +16,7 @@ from truenorth.filters.stack import System
 from truenorth.filters.system import Estimates, FilterState, runs_of
 
 History = Literal["last", "sigma", "full"]
+HISTORIES = get_args(History)
 T = TypeVar("T", bound=tuple[Any, ...])
 
 
@@ -74,7 +75,7 @@ def drive(
     flatten : callable
         ``flatten(system, shape)`` brings the system's arrays to what the kernel takes.
     """
-    if history not in get_args(History):
+    if history not in HISTORIES:
         raise UsageError(f'history is {history!r}, expected "last", "sigma" or "full"')
     if state is not None:
         system = system.with_arrays(x0=state.x, P0=state.P)
@@ -152,7 +153,7 @@ def part(arrays: T, start: int, stop: int) -> T:
 
 
 def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
-    if not out.failure[:, 0].any():
+    if not out.failure.any():
         return
     failed = np.flatnonzero(out.failure[:, 0])
     reason, epoch = out.failure[failed[0]]

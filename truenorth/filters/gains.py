@@ -221,7 +221,7 @@ def initial_part(step: Array, P0: Array, states: slice = slice(None)) -> tuple[A
     """
     whole, size = np.asarray(P0, dtype=np.float64), step.shape[-1]
     known = np.flatnonzero(whole.any(axis=0))  # the others make no part
-    inner = whole[np.ix_(known, known)]
+    inner = whole[known[:, None], known]
     part = np.empty((len(step), *whole[states, states].shape))
     response = np.zeros((size, 8 * ((len(known) + 7) // 8)))
     response[known, np.arange(len(known))] = 1.0

@@ -87,7 +87,8 @@ class System(ABC):
     def runs(self) -> tuple[int, ...]:
         """Shape of the run axes; ``()`` for a single run."""
         axes, arrays = self.axes, self._arrays()
-        if all(a.ndim == len(axes[name]) for name, a in arrays):
+        of_runs = [name for name, a in arrays if a.ndim > len(axes[name])]
+        if not of_runs:
             return ()
         return np.broadcast_shapes(*(a.shape[: a.ndim - len(axes[name])] for name, a in arrays))
 

@@ -182,9 +182,7 @@ class Runs(NamedTuple):
 
 def runs_of(system: LinearSystem, shape: tuple[int, ...]) -> Runs:
     """Bring each array of a system to ``(B or 1, ...)``, contiguous and read-only (one type for the kernels)."""
-    zero = {"u": np.zeros((1, system.states)), "S": np.zeros((1, system.states, system.rows))}
-    flat = {}
-    for name, axes in AXES.items():
-        value = getattr(system, name)
-        flat[name] = flatten_runs(zero[name] if value is None else value, len(axes), shape)
-    return Runs(**flat)
+    u = np.zeros((1, system.states)) if system.u is None else system.u
+    S = np.zeros((1, system.states, system.rows)) if system.S is None else system.S
+    given = (system.Phi, system.Q, system.H, system.R, system.z, system.x0, system.P0, u, S)
+    return Runs._make([flatten_runs(a, len(axes), shape) for a, axes in zip(given, AXES.values(), strict=True)])

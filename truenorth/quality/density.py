@@ -167,7 +167,7 @@ def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSp
         return []
     noise = white_noise(record)
     said_noise = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3)
-    if np.any(noise > limit("another sensor") * said_noise):
+    if (noise > limit("another sensor") * said_noise).any():
         noise = np.nan_to_num(walk_density(record))
     found = []
     for name, channels, said in (

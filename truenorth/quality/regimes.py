@@ -18,6 +18,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from truenorth.core.attitude import length_of
 from truenorth.core.remembered import remembered
 from truenorth.quality.signals import (
     LEVEL_WINDOW,
@@ -137,7 +138,7 @@ class MotionSummary:
         """The strongest kind of motion, in the order of `KINDS`, that over 5 % of the seconds show."""
         if self.kind.size == 0:
             return "unknown"
-        return KINDS[int(np.flatnonzero(self._shares > OVERALL_SHARE)[-1])]
+        return KINDS[int((self._shares > OVERALL_SHARE).nonzero()[0][-1])]
 
     @cached_property
     def _shares(self) -> Array:
@@ -206,30 +207,32 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
         return _unknown(record)
     rates = rates[:, : seconds * per_second]
 
-    angle_noise, force_noise = np.split(white_noise(record), 2)
+    noise = white_noise(record)
+    angle_noise, force_noise = noise[:3], noise[3:]
     wander = angle_wander(rates[:3], interval, per_second)  # (3, windows), of each window of up to 10 s
     bias = rate_bias(rates[:3], wander, per_second, angle_noise)
-    still_gravity = bias_by_gravity(second_means(rates[:3], per_second), second_means(rates[3:], per_second))
+    force = second_means(rates[3:], per_second)
+    still_gravity = bias_by_gravity(second_means(rates[:3], per_second), force)
     bias = bias if still_gravity is None else still_gravity
     gyro = rates[:3] - bias[:, None]
     rate = second_means(gyro, per_second)
-    force = second_means(rates[3:], per_second)
     steady = unturned(gyro * interval, rates[3:])  # specific force in axes that do not turn
     motion, gain = acceleration(second_means(steady, per_second), force)
 
     turned = np.minimum(1.0, np.linalg.norm(box_mean(rate, LEVEL_WINDOW), axis=0) * LEVEL_WINDOW)
-    noise = angle_noise[:, None] * np.sqrt(min(WINDOW, seconds) / 15.0)  # detrended random walk: N^2 T / 15
-    active = np.any(wander > np.hypot(STILL_ANGLE, NOISE_FACTOR * noise), axis=0)
+    walked = angle_noise[:, None] * np.sqrt(min(WINDOW, seconds) / 15.0)  # detrended random walk: N^2 T / 15
+    active = np.any(wander > np.hypot(STILL_ANGLE, NOISE_FACTOR * walked), axis=0)
     around = wander.max(axis=0)[offset(seconds, seconds - wander.shape[1] + 1)]
-    biased = np.clip(NOISY_BIAS * np.linalg.norm(force_noise), TURNED_BIAS, LARGEST_BIAS)
+    noisy = length_of(force_noise)
+    biased = min(max(NOISY_BIAS * noisy, TURNED_BIAS), LARGEST_BIAS)
     kind = _classify(
         rate,
         active=_in_every_window(active, seconds),
         sways=around * np.sqrt(2.0) > SWAY_ANGLE,
-        accelerates=motion > np.hypot(MOVING_ACCELERATION, 3.0 * np.linalg.norm(force_noise)) + biased * turned,
+        accelerates=motion > np.hypot(MOVING_ACCELERATION, 3.0 * noisy) + biased * turned,
         gains=gain > LEAST_GAIN,
         gains_speed=gain > SWAY_ACCELERATION,
-        rate_noise=float(np.linalg.norm(angle_noise)),
+        rate_noise=length_of(angle_noise),
     )
     time = record.time[0] - record.interval + per_second * interval * np.arange(1, seconds + 1)
     return MotionSummary(time, kind, rate.T, force.T, motion, around, bias, angle_noise, _stretches(time, kind, record))
@@ -318,7 +321,7 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _stretches(time: Array, kind: NDArray[np.int8], record: ImuRecord) -> tuple[Regime, ...]:
-    changes = np.flatnonzero(np.diff(kind)) + 1
+    changes = (kind[1:] != kind[:-1]).nonzero()[0] + 1
     stops = [*time[changes - 1].tolist(), float(record.time[-1])]
     starts = [float(record.time[0] - record.interval), *stops[:-1]]
     kinds = kind[[0, *changes.tolist()]]

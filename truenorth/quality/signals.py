@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import normalised, quaternion_from_rotation_vector, quaternion_product, rotate
+from truenorth.core.attitude import length_of, normalised, quaternion_from_rotation_vector, quaternion_product, rotate
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import DataError
 from truenorth.core.remembered import remembered
@@ -31,6 +31,7 @@ QUARTER_TURN = np.radians(90.0)
 UNTURNED = 0.1  # part of the turn that gyros show, below which gravity has not turned at all
 SCATTERED = 0.5  # length of the mean of unit vectors, below which gravity has no one direction
 MISALIGNED = 0.1  # rad: of the gyros and of a turntable's axis, at the most
+SURE_BIAS = float(np.radians(0.1))  # rad/s; any sensor may have as much
 LARGEST_BIAS = np.radians(3.0)  # rad/s; above this a constant rate is a turn, whatever the sensor
 
 
@@ -80,8 +81,8 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
 
 
 def second_means(signal: Array, per_second: int) -> Array:
-    """(3, seconds) means of (3, cells)."""
-    return np.asarray(signal.reshape(3, -1, per_second) @ np.ones(per_second) / per_second)
+    """(k, seconds) means of (k, cells)."""
+    return np.asarray(signal.reshape(len(signal), -1, per_second) @ np.ones(per_second) / per_second)
 
 
 def white_noise(record: ImuRecord) -> Array:
@@ -145,15 +146,15 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
     length = min(WINDOW * per_second, rates.shape[1])
     seconds = np.ascontiguousarray(rates).reshape(3, -1, per_second) @ np.ones(per_second)
     mean = _neighbours(seconds, length // per_second) / length
-    limit = np.clip(50.0 * float(np.linalg.norm(angle_noise)), np.radians(0.1), LARGEST_BIAS)
+    limit = min(max(50.0 * length_of(angle_noise), SURE_BIAS), LARGEST_BIAS)
     bias = _constant_part(mean, wander)
-    if np.linalg.norm(bias) < limit:
+    if length_of(bias) < limit:
         return bias
     believable = np.linalg.norm(mean, axis=0) < limit
     if not believable.any():
         return np.zeros(3)
     bias = _constant_part(mean[:, believable], wander[:, believable])
-    return bias if np.linalg.norm(bias) < limit else np.zeros(3)
+    return bias if length_of(bias) < limit else np.zeros(3)
 
 
 def _constant_part(mean: Array, wander: Array) -> Array:
@@ -168,7 +169,8 @@ def median_of_rows(values: Array) -> Array:
     """(k, 1) median of each row: :func:`numpy.median`, which takes longer to begin."""
     half = values.shape[1] // 2
     before = half if values.shape[1] % 2 else half - 1
-    parted = np.partition(values, (before, half), axis=1)
+    parted = values.copy()
+    parted.partition((before, half), axis=1)
     return np.asarray(0.5 * (parted[:, half : half + 1] + parted[:, before : before + 1]))
 
 
@@ -186,11 +188,11 @@ def bias_by_gravity(rate: Array, force: Array) -> Array | None:
     mean = rate.mean(axis=1)
     up = force / np.maximum(np.linalg.norm(force, axis=0), 1e-9)
     vertical = up.mean(axis=1)
-    if np.linalg.norm(vertical) < SCATTERED:
+    if length_of(vertical) < SCATTERED:
         return None
     along = vertical * (mean @ vertical) / (vertical @ vertical)
-    across = float(np.linalg.norm(mean - along))
-    if across < MISALIGNED * float(np.linalg.norm(along)):
+    across = length_of(mean - along)
+    if across < MISALIGNED * length_of(along):
         return None
     lag = min(WINDOW, max(1, int(QUARTER_TURN / max(across, 1e-9))))
     if across * lag < SEEN_TURN or rate.shape[1] < 2 * lag:
@@ -241,7 +243,7 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
     within = np.arange(seconds) - first
     half = width // 2
     halves = _medians(signal, half)
-    early, late = halves[:, first], halves[:, first + (width - half)]
+    early, late = halves.take(first, axis=1), halves.take(first + (width - half), axis=1)
     line = early + (late - early) * (within - (half - 1) / 2.0) / (width - half)
     return _running_median(signal), line
 
@@ -249,7 +251,7 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
 def _running_median(signal: Array) -> Array:
     """(3, m) median of the 31 s around each second."""
     width = min(LEVEL_WINDOW, signal.shape[1])
-    return _medians(signal, width)[:, offset(signal.shape[1], width)]
+    return _medians(signal, width).take(offset(signal.shape[1], width), axis=1)
 
 
 def _medians(signal: Array, width: int) -> Array:
@@ -293,7 +295,7 @@ def box_mean(signal: Array, width: int) -> Array:
     """(k, m) mean over `width` seconds around each second; at the ends over the last `width` that fit."""
     seconds = signal.shape[1]
     width = min(width, seconds)
-    return np.asarray(_neighbours(signal, width)[:, offset(seconds, width)] / width)
+    return np.asarray(_neighbours(signal, width).take(offset(seconds, width), axis=1) / width)
 
 
 def _neighbours(signal: Array, count: int) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,26 +74,35 @@ def passed(record: ImuRecord) -> Passed:
     lengths = [max(1, round(tau / record.interval)) for tau in TIMES]
     cell, every = rows_of_cell(record), math.gcd(*lengths)
     parts = min(BLOCKS, count)
-    edges = np.append(np.linspace(0, count, parts + 1).astype(int)[:-1], count)
+    edges = _edges(count, parts)
     cells, total = np.empty((6, count // cell)), np.empty((count // every + 1, 8))
     blocks, gyro, force = np.empty((parts, 8)), np.empty((2, 4)), np.empty(2)
     _pass_over(record.gyro, record.accel, record.steps, cell, every, edges, cells, total, blocks, gyro, force)
     return Passed(cells, _white_noise(record, lengths, every, total), blocks[:, :7], gyro[:, :3], (force[0], force[1]))
 
 
+@lru_cache(maxsize=16)
+def _edges(count: int, parts: int) -> NDArray[np.int64]:
+    """(parts + 1,) rows between parts of so many rows; nobody writes to them."""
+    return np.append(np.linspace(0, count, parts + 1).astype(int)[:-1], count)
+
+
 def _white_noise(record: ImuRecord, lengths: list[int], every: int, total: Array) -> Array:
     """The least random walk (6,) that means of rows of these lengths show, by sums up to each `every`-th row."""
-    least = np.full(6, np.inf)
-    scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
+    quiet, used, rows = [], [], len(record)
     for m in lengths:
-        count = len(record) // m
+        count = rows // m
         if count < 4:
             break
         group = min(count - 1, max(3, round(QUIET / (m * record.interval))))
         variance = np.empty(((count - 1) // group, 8))
         _allan_variances(total, m // every, m, group, variance)
-        quiet = _lower_quartiles(variance[:, :6])
-        least = np.minimum(least, scale * np.sqrt(quiet * m * record.interval))
+        quiet.append(_lower_quartiles(variance[:, :6]))
+        used.append([m])
+    if not used:
+        return np.zeros(6)
+    scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
+    least = (scale * np.sqrt(np.array(quiet) * used * record.interval)).min(axis=0)
     return np.where(np.isfinite(least), least, 0.0)
 
 
@@ -158,7 +168,8 @@ def _lower_quartiles(values: Array) -> Array:
     place = 0.25 * (len(values) - 1)
     below = int(place)
     above = min(below + 1, len(values) - 1)
-    ordered = np.partition(values, (below, above), axis=0)
+    ordered = values.copy()
+    ordered.partition((below, above), axis=0)
     return np.asarray(ordered[below] + (place - below) * (ordered[above] - ordered[below]))
 
 

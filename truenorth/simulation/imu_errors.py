@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,18 @@ from truenorth.simulation.streams import STREAMS
 from truenorth.simulation.true_errors import SensorErrors, TrueErrors, drawn_errors
 
 Array = NDArray[np.float64]
+# Of a sensor, besides the constant ones: noise, and how it responds.
+TERMS = (
+    "random_walk",
+    "sample_noise",
+    "bias_instability",
+    "rate_random_walk",
+    "bandwidth",
+    "filter_order",
+    "latency",
+    "range",
+    "quantisation",
+)
 
 
 def apply_errors(
@@ -54,38 +67,35 @@ def apply_errors(
     errors : TrueErrors
     """
     errors = drawn_errors(spec, seed=seed, run=run, scenario=scenario, given=given)
-    dT = temperature(spec, interval, len(dtheta))
+    count, steady = len(dtheta), spec.temperature_start == spec.temperature_rate == 0.0
+    dT = None if steady else temperature(spec, interval, count)
     results = []
     for group, ideal in (("gyro", dtheta), ("accel", dvel)):
 
         def stream_of(term: str, group: str = group) -> Normals:
             return normals_at(seed, scenario, run, STREAMS[f"{group}_{term}"])
 
-        def value(term: str, group: str = group) -> float:
-            return float(getattr(spec, f"{group}_{term}"))
-
         own: SensorErrors = getattr(errors, group)
-        bias, walk = own.constant_bias * interval, value("random_walk") * math.sqrt(interval)
-        warmth = dT if own.bias_temperature.any() and dT.any() else None
-        terms = {
-            (seed, scenario, run, STREAMS[f"{group}_{term}"]): recursion
-            for term, recursion in _recursions(interval, value, spec.correlation_time).items()
-        }
-        wander = Wander(len(dT), interval, terms, warmth, own.bias_temperature)
-        late = math.isfinite(value("bandwidth")) or value("latency") != 0.0
+        value, recursions = _terms_of(spec, group, interval)
+        bias, walk = own.constant_bias * interval, value["random_walk"] * math.sqrt(interval)
+        warmth = dT if dT is not None and own.bias_temperature.any() and dT.any() else None
+        terms = {(seed, scenario, run, number): recursion for number, recursion in recursions}
+        wander = Wander(count, interval, terms, warmth, own.bias_temperature)
+        late = math.isfinite(value["bandwidth"]) or value["latency"] != 0.0
         one = warmth is None and len(terms) == 1
         if one and own.is_linear and not late:
             sensed, matrix = np.ascontiguousarray(ideal), own.matrix
         else:
             sensed, matrix = np.empty_like(ideal), np.zeros((3, 3))
+            warm = np.zeros(count) if dT is None else dT
             _sense(
-                *(np.ascontiguousarray(x) for x in (ideal, dvel, dT, own.matrix, own.g_sensitivity)),
+                *(np.ascontiguousarray(x) for x in (ideal, dvel, warm, own.matrix, own.g_sensitivity)),
                 own.scale_factor_temperature,
                 own.scale_factor_asymmetry,
                 sensed,
             )
-            order = int(value("filter_order"))
-            sensed = respond(sensed, interval, bandwidth=value("bandwidth"), order=order, latency=value("latency"))
+            order = int(value["filter_order"])
+            sensed = respond(sensed, interval, bandwidth=value["bandwidth"], order=order, latency=value["latency"])
         if one:
             ((numbers, recursion),) = terms.items()
             steps, white = normals_at(*numbers), stream_of("random_walk")
@@ -97,9 +107,9 @@ def apply_errors(
                 out += wander.integrals()
             if walk > 0.0:
                 _make_noise(out.reshape(-1), stream_of("random_walk"), walk)
-        if value("sample_noise") > 0.0:
-            _make_noise(out.reshape(-1), stream_of("sample_noise"), value("sample_noise") * interval)
-        full_scale, step = value("range") * interval, value("quantisation")
+        if value["sample_noise"] > 0.0:
+            _make_noise(out.reshape(-1), stream_of("sample_noise"), value["sample_noise"] * interval)
+        full_scale, step = value["range"] * interval, value["quantisation"]
         if step > 0.0 or math.isfinite(full_scale):
             _put_out(out, full_scale, step)
         results.append((out, replace(own, wander=wander)))
@@ -122,14 +132,18 @@ def size_effect(leverage: Array, spec: ImuSpec) -> Array:
     return np.einsum("kij,ij->ki", leverage, np.asarray(spec.accel_positions))
 
 
-def _recursions(interval: float, value: Any, tau: float) -> dict[str, Recursion]:
-    """Of the terms that wander by themselves, how they go on."""
+@lru_cache(maxsize=16)
+def _terms_of(
+    spec: ImuSpec, group: str, interval: float
+) -> tuple[Mapping[str, float], tuple[tuple[int, Recursion], ...]]:
+    """Terms of a group's noise and response by name, and of those that wander by themselves stream and recursion."""
+    value = {term: float(getattr(spec, f"{group}_{term}")) for term in TERMS}
     found = {}
-    if value("bias_instability") > 0.0:
-        found["bias_instability"] = of_gauss_markov(value("bias_instability"), tau, interval)
-    if value("rate_random_walk") > 0.0:
-        found["rate_random_walk"] = of_random_walk(value("rate_random_walk"), interval)
-    return found
+    if value["bias_instability"] > 0.0:
+        found["bias_instability"] = of_gauss_markov(value["bias_instability"], spec.correlation_time, interval)
+    if value["rate_random_walk"] > 0.0:
+        found["rate_random_walk"] = of_random_walk(value["rate_random_walk"], interval)
+    return value, tuple((STREAMS[f"{group}_{term}"], recursion) for term, recursion in found.items())
 
 
 @compiled

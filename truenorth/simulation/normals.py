@@ -12,7 +12,7 @@ layers and the order of draws of NumPy; M. O'Neill, "Developing a seed_seq alter
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from operator import index
 from typing import Any, NamedTuple
 
@@ -79,7 +79,7 @@ def normals_of(rng: np.random.Generator) -> Normals:
 
 def normals_at(seed: int, *key: int) -> Normals:
     """The numbers of :func:`truenorth.simulation.streams.stream`, which takes five times as long to begin."""
-    words = _words_of(seed)
+    words = [*_words_of(seed)]
     words += [0] * (POOL - len(words))
     for number in key:
         words += _words_of(number)
@@ -96,7 +96,8 @@ def first_normals(shape: tuple[int, ...], seed: int, *key: int) -> NDArray[np.fl
     return found
 
 
-def _words_of(number: int) -> list[int]:
+@lru_cache(maxsize=256, typed=True)
+def _words_of(number: int) -> tuple[int, ...]:
     """Of 32 bits each, the lowest first."""
     left = index(number)
     if left < 0:
@@ -104,7 +105,7 @@ def _words_of(number: int) -> list[int]:
     words = [left & 0xFFFFFFFF]
     while left := left >> 32:
         words.append(left & 0xFFFFFFFF)
-    return words
+    return tuple(words)
 
 
 def _halves(x: int) -> Words:

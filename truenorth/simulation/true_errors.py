@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from truenorth.simulation.normals import first_normals
 from truenorth.simulation.streams import STREAMS
 
 Array = NDArray[np.float64]
+GROUPS = ("gyro", "accel")
 SHAPES: dict[str, tuple[int, ...]] = {
     "bias": (3,),
     "turn_on_bias": (3,),
@@ -82,8 +83,9 @@ class SensorErrors:
     @property
     def is_linear(self) -> bool:
         """Whether a sensor is a matrix and a bias: neither temperature nor sign nor, of a gyro, force changes what it gives."""
-        others = self.scale_factor_temperature, self.scale_factor_asymmetry, self.g_sensitivity
-        return not any(term.any() for term in others)
+        return not (
+            self.scale_factor_temperature.any() or self.scale_factor_asymmetry.any() or self.g_sensitivity.any()
+        )
 
     @property
     def matrix(self) -> Array:
@@ -149,25 +151,33 @@ def drawn_errors(
     UsageError
         A name that is not known, or a value of another shape.
     """
-    known = [f"{group}_{term}" for group in ("gyro", "accel") for term in SHAPES if term in KEYS[group]]
-    values = {name: _given(name, value, known) for name, value in (given or {}).items()}
-
-    def value(group: str, term: str) -> Array:
-        name, shape = f"{group}_{term}", SHAPES[term]
-        sigma = getattr(spec, name, 0.0)
+    values: dict[str, Array] = {}
+    if given:
+        known = [f"{group}_{term}" for group in GROUPS for term in SHAPES if term in KEYS[group]]
+        values = {name: _given(name, value, known) for name, value in given.items()}
+    terms: dict[str, dict[str, Any]] = {group: {} for group in GROUPS}
+    for group, term, name, sigma in _sigmas_of(spec):
+        shape = SHAPES[term]
         if name in values:
-            return values[name]
-        if sigma == 0.0:
-            return np.zeros(shape)
-        draw: Array = sigma * first_normals(shape, seed, scenario, run, STREAMS[name])
-        return draw - np.diag(np.diag(draw)) if term == "misalignment" else draw
+            terms[group][term] = values[name]
+        elif sigma == 0.0:
+            terms[group][term] = np.zeros(shape)
+        else:
+            terms[group][term] = draw = sigma * first_normals(shape, seed, scenario, run, STREAMS[name])
+            if term == "misalignment":
+                draw.reshape(-1)[:: shape[1] + 1] = 0.0
+    return TrueErrors(*(SensorErrors(**terms[group]) for group in GROUPS))
 
-    def drawn_of(group: str) -> SensorErrors:
-        terms: dict[str, Any] = {term: value(group, term) for term in SHAPES}
-        return SensorErrors(**terms)
 
-    gyro, accel = (drawn_of(group) for group in ("gyro", "accel"))
-    return TrueErrors(gyro, accel)
+@lru_cache(maxsize=16)
+def _sigmas_of(spec: ImuSpec) -> tuple[tuple[str, str, str, float], ...]:
+    """Group, term, name and one sigma of all that is constant in a run."""
+    return tuple(
+        (group, term, name, getattr(spec, name, 0.0))
+        for group in GROUPS
+        for term in SHAPES
+        for name in (f"{group}_{term}",)
+    )
 
 
 def _given(name: str, value: ArrayLike, known: list[str]) -> Array:

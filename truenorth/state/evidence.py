@@ -27,6 +27,8 @@ class Effect:
 
     def joined(self, other: Effect) -> Effect:
         """The root of the sum of squares of two independent errors."""
+        if other is NO_EFFECT:
+            return self
         return Effect(*(math.hypot(a, b) for (_, a), (_, b) in zip(self.items(), other.items(), strict=True)))
 
     def or_larger(self, other: Effect) -> Effect:

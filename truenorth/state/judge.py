@@ -72,8 +72,7 @@ def judge(claim: Claim, evidence: Iterable[Evidence]) -> Verdict:
     if given.heading > claim.heading_limit:  # refused, whatever else is found
         given = replace(given, heading=claim.heading_limit if claim.able else math.inf)
     for item in evidence:
-        size = weight(item.effect, given)
-        if item.kind == "note" or size <= limit("negligible"):
+        if item.kind == "note" or (size := weight(item.effect, given)) <= limit("negligible"):
             rest.append(item)
         elif item.kind == "hint" and math.isfinite(size):
             hinted = hinted.joined(_on(item.effect, given))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,11 +49,16 @@ def joined(*blocks: ArrayLike) -> Array:
     ----------
     *blocks : (m, m) covariances, or (m,) sigmas
     """
-    square = [np.diag(b**2) if b.ndim == 1 else b for b in (np.asarray(block, dtype=np.float64) for block in blocks)]
-    edges = np.cumsum([0, *map(len, square)])
-    P = np.zeros((edges[-1], edges[-1]))
-    for first, last, block in zip(edges, edges[1:], square):
-        P[first:last, first:last] = block
+    given = [np.asarray(block, dtype=np.float64) for block in blocks]
+    edges = [0, *accumulate(map(len, given))]
+    n = edges[-1]
+    P = np.zeros((n, n))
+    diagonal = P.reshape(-1)[:: n + 1]
+    for first, last, block in zip(edges, edges[1:], given):
+        if block.ndim == 1:
+            diagonal[first:last] = block**2
+        else:
+            P[first:last, first:last] = block
     return P
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import string
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from truenorth.core.language import retold, translated
@@ -19,29 +20,39 @@ from truenorth.state.evidence import Evidence
 from truenorth.state.remedies import REMEDIES, TERMS
 from truenorth.state.titles import TITLES
 
+_FORMATTER = string.Formatter()
 
-class _Figures(string.Formatter):
-    """Fills a template; the units are written by the template itself."""
 
-    def format_field(self, value: Any, format_spec: str) -> str:
-        """One figure, in its unit."""
-        if format_spec == "term":
-            return translated(TERMS.get(str(value), str(value)))
-        if format_spec == "imu":  # after the word "specification"
-            return translated(TERMS.get(str(value), str(value).removeprefix("specification ")))
-        if format_spec == "angle":
-            return angle(float(value))
-        if not format_spec and isinstance(value, str):  # a name, or what was found in a log
-            return retold(value)
-        unit, bar, spec = format_spec.partition("|")
-        if not bar:
-            return format(value, format_spec)
-        number = float(value) / parse_unit(unit)[0]
-        return significant(number) if spec == "" else format(number, spec)
+def _figure(value: Any, spec: str) -> str:
+    """One figure, in its unit, which is written by the template itself."""
+    if spec == "term":
+        return translated(TERMS.get(str(value), str(value)))
+    if spec == "imu":  # after the word "specification"
+        return translated(TERMS.get(str(value), str(value).removeprefix("specification ")))
+    if spec == "angle":
+        return angle(float(value))
+    if not spec and isinstance(value, str):  # a name, or what was found in a log
+        return retold(value)
+    unit, bar, digits = spec.partition("|")
+    if not bar:
+        return format(value, spec)
+    number = float(value) / parse_unit(unit)[0]
+    return significant(number) if digits == "" else format(number, digits)
+
+
+@lru_cache(maxsize=1024)
+def _parts_of(template: str) -> tuple[tuple[str, str | None, str | None, str | None], ...]:
+    """Text, and the field behind it with its specification and conversion."""
+    return tuple(_FORMATTER.parse(template))
 
 
 def _filled(template: str, figures: Mapping[str, Any]) -> str:
-    return _Figures().vformat(translated(template), (), figures)
+    filled = []
+    for text, name, spec, conversion in _parts_of(translated(template)):
+        filled.append(text)
+        if name is not None:
+            filled.append(_figure(_FORMATTER.convert_field(figures[name], conversion), spec or ""))
+    return "".join(filled)
 
 
 def angle(x: float) -> str:

@@ -162,14 +162,14 @@ def integrate(
         C_0, v_0, since = C_all[0].T, v_all[0], grid.since[:, None]
         C_all, v_all, p_all = C_0 @ C_all, (v_all - v_0) @ C_0.T, (p_all - p_all[0] - since * v_0) @ C_0.T
 
-    C, ends = C_all[grid.on_grid], grid.on_grid[:: grid.sub]
+    C, ends = C_all.take(grid.on_grid, axis=0), grid.on_grid[:: grid.sub]
     C_mean, C_late = interval_means(C, grid.time, grid.sub)
     return InertialIntegrals(
         start=float(record.time[context] - record.steps[context]),
         time=grid.time[:: grid.sub],
-        C_ib=C_all[ends],
-        velocity=v_all[ends],
-        position=p_all[ends],
+        C_ib=C_all.take(ends, axis=0),
+        velocity=v_all.take(ends, axis=0),
+        position=p_all.take(ends, axis=0),
         C_mean=C_mean,
         C_late=C_late,
         C_ib_at=C_all[grid.at],
