@@ -27,7 +27,7 @@ from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
-from truenorth.alignment.in_motion_untold import UNTOLD, by_gravity, fits_worse, hidden_from, with_heading_held
+from truenorth.alignment.in_motion_untold import UNTOLD, fits_worse, hidden_from, of_level
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
@@ -217,12 +217,9 @@ def _aligned(
         last = open_track(task, first, track)
     if last is not None:
         spread = bank.beyond(SURELY * float(last.sigma[-1, PHI][2]))
-    elif method == "motion" and passes > 1 and hidden_from(task):
+    elif method == "motion" and (hidden_from(task) or spread.and_more(found.sigma).heading > UNTOLD):
         tell(f"pass {number + 1}")
-        if (held := with_heading_held(task, found, first)) is not None:
-            guess, track, spread = held[0].guess, held[0].track, held[1]
-    elif method == "motion" and spread.and_more(found.sigma).heading > UNTOLD:
-        task, guess, track = by_gravity(task, found, first)
+        task, guess, track, spread = of_level(task, found, first, spread)
     answer = moving_answer(task, task.with_lasting_fixes(last or track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []

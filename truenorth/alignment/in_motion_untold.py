@@ -43,42 +43,67 @@ MOST = 12  # passes
 
 def hidden_from(task: MovingTask) -> bool:
     """Whether the log tells no heading: velocities in body axes alone, and gyros that hide the earth's rate."""
-    if task.gnss is not None or task.more:
-        return False
+    return task.gnss is None and not task.more and told_by_the_earth(task) > UNTOLD
+
+
+def told_by_the_earth(task: MovingTask) -> float:
+    """One sigma of heading, rad, by gyros whose constant biases are known: their noise and the slow parts of biases are left."""
     spec = task.spec
-    slow = np.max(spec.bias_variance[:3] - spec.constant_variance[:3])
-    rate = math.sqrt(spec.gyro_random_walk**2 / task.record.duration + max(float(slow), 0.0))
-    return rate > EARTH_RATE * math.cos(task.position.lat) * UNTOLD
+    slow = float(np.max(spec.bias_variance[:3] - spec.constant_variance[:3]))
+    rate = math.sqrt(spec.gyro_random_walk**2 / task.record.duration + max(slow, 0.0))
+    return rate / max(EARTH_RATE * math.cos(task.position.lat), 1e-12)
 
 
-def with_heading_held(task: MovingTask, found: Pass, first: Guess) -> tuple[Pass, Spread] | None:
-    """The last of the passes that hold a heading, and what headings all round say of heading and level.
+def of_level(task: MovingTask, found: Pass, first: Guess, spread: Spread) -> tuple[MovingTask, Guess, Track, Spread]:
+    """Task, guess, track and spread whose level holds where nothing tells the heading.
+
+    Level is that of gravity, as uncertain as the accelerometers' biases, unless the log speaks against that, since the vehicle has
+    turned. Then it is that of passes with a held heading; where they do not settle, or something else may tell heading, it stays
+    as it was found, and where nothing does, as uncertain as the biases again.
 
     Parameters
     ----------
     task : MovingTask
     found : Pass
-        The last of those that do not; its heading is held.
+        The last of the passes that hold no heading.
     first : Guess
         Of the first pass.
-
-    Returns
-    -------
-    Pass and Spread, or None
-        None where the filter breaks down, or level does not settle.
+    spread : Spread
+        Of the bank.
     """
+    hidden = hidden_from(task)
+    if hidden:  # a bank that is surer took the products of errors for knowledge
+        spread = spread.and_more(told_by_the_earth(task))
+    by_gravity = _by_gravity(task, found, first)
+    if by_gravity is not None:
+        return *by_gravity, spread
+    if not hidden:
+        return task, found.guess, found.track, spread
+    held = _with_heading_held(task, found, first)
+    if held is None:
+        return task, found.guess, with_level_biases(task, found.track), spread.and_more(found.sigma)
+    last, all_round = held
+    return task, last.guess, last.track, all_round.and_more(told_by_the_earth(task))
+
+
+def _with_heading_held(task: MovingTask, found: Pass, first: Guess) -> tuple[Pass, Spread] | None:
+    """The last of the passes that hold a heading, and what headings all round say; None where level does not settle."""
     try:
         last = _held(task, replace(found.guess, heading_sigma=HELD))
         for _ in range(MOST):
-            before, last = (
-                last,
-                _held(task, replace(led_back(last.track, last.back, task.spec, first), heading_sigma=HELD)),
-            )
+            before, last = last, _held(task, _led_on(last, task, first))
             if _moved(before.track, last.track) < SETTLED:
                 return _of_all_round(task, last)
     except DataError:  # the filter broke down
         pass
     return None
+
+
+def _led_on(last: Pass, task: MovingTask, first: Guess) -> Guess:
+    """Where the next pass begins: about all the biases that the last one found."""
+    guess = led_back(last.track, last.back, task.spec, first)
+    bias, nabla = last.track.gyro_bias[-1], last.track.accel_bias[-1]
+    return replace(guess, heading_sigma=HELD, gyro_bias=bias, accel_bias=nabla)
 
 
 def _held(task: MovingTask, guess: Guess) -> Pass:
@@ -120,7 +145,10 @@ def _of_all_round(task: MovingTask, last: Pass) -> tuple[Pass, Spread]:
     held = [last]
     for k in range(1, HEADINGS):
         turn = dcm_from_euler(2.0 * math.pi * k / HEADINGS, 0.0, 0.0)
-        held.append(_held(task, replace(last.guess, C_nb=turn @ last.guess.C_nb)))
+        try:
+            held.append(_held(task, replace(last.guess, C_nb=turn @ last.guess.C_nb)))
+        except DataError:  # the filter breaks down: this heading is none
+            continue
     cost = np.array([misfit(each.track.residuals) for each in held])
     weight = np.exp(-0.5 * (cost - cost.min()))
     best = int(np.argmin(cost))
@@ -128,15 +156,15 @@ def _of_all_round(task: MovingTask, last: Pass) -> tuple[Pass, Spread]:
     return held[best], spread.and_more(2.0 * math.pi / HEADINGS / math.sqrt(12.0))
 
 
-def by_gravity(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Guess, Track]:
-    """Task, guess and track of a pass that takes no tilt for a bias; the same ones where the log speaks against it."""
+def _by_gravity(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Guess, Track] | None:
+    """Task, guess and track of a pass that takes no tilt for a bias; None where the log speaks against it."""
     held = task.with_level_biases_held()
     try:
         last = once_more(held, begun(held, first, held.run(first, gated=False)), first)
         other = with_level_biases(task, last.track)
     except DataError:  # the filter broke down
-        return task, found.guess, found.track
-    return (task, found.guess, found.track) if fits_worse(found.track, other) else (held, last.guess, other)
+        return None
+    return None if fits_worse(found.track, other) else (held, last.guess, other)
 
 
 def fits_worse(track: Track, other: Track) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from os import PathLike
@@ -26,7 +27,7 @@ from truenorth.alignment.transfer_smoothed import filter_sigmas
 from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
-from truenorth.core.errors import DataError, UsageError
+from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.group import Group
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
@@ -99,7 +100,7 @@ def align_transfer(
     master : MasterRecord
         At any rate and times, rows may be missing; attitude or velocity or both, position where there is one.
     imu : ImuSpec, str, path or mapping, optional
-        Specification of the slave. Left out, the preset "industrial", or "consumer" where the log speaks against that.
+        Specification of the slave. Left out, the preset "industrial", or "consumer" where biases are larger than that allows.
     matching : {"auto", "velocity", "attitude", "both", "position", "acceleration", "position+attitude", "acceleration+attitude"}
         What of the master is matched; velocity and attitude, as far as it gives them, when left out. Position is slower than
         velocity and bears a constant error of the master's velocity (the sigma of velocity is against the master then);
@@ -149,7 +150,7 @@ def align_transfer(
     if flexure is not None and not what.attitude:
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
     spec = imu_spec(USUAL if imu is None else imu)
-    where = f"preset {USUAL}, since none was given" if imu is None else f"specification {spec.name}"
+    where = f"specification {spec.name}"
     record = slave
     slave = bridged(corrected(slave, spec, calibration))
 
@@ -177,11 +178,19 @@ def align_transfer(
             answer = by(said, spec, where)
         return answer
 
-    answer = of(spec, where)
-    if imu is None and answer.status == "inconsistent":  # a poorer slave than is usual, which nobody spoke of
-        poorer = of(imu_spec(POORER), f"preset {POORER}, since none was given and the log speaks against {USUAL}")
-        answer = answer if poorer.status == "inconsistent" else poorer
+    answer = of(spec, where) if imu is not None else _of_usual_grade(of)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
+
+
+def _of_usual_grade(of: Callable[[ImuSpec, str], Alignment]) -> Alignment:
+    """Of a slave of which nothing is said: the usual preset, or a poorer one that biases show; a master that jumps shows none."""
+    answer = of(imu_spec(USUAL), f"preset {USUAL}, since none was given")
+    beyond = any(item.key in ("bias.gyro", "bias.accel") for item in answer.evidence)
+    if answer.status == "inconsistent" and beyond:
+        with suppress(AlignmentError, DataError):  # it does not fit at all: what was found stays
+            poorer = of(imu_spec(POORER), f"preset {POORER}, since none was given and the log speaks against {USUAL}")
+            answer = answer if poorer.status == "inconsistent" else poorer
+    return answer
 
 
 def _aligned(

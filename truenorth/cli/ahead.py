@@ -61,7 +61,8 @@ def _of_last() -> tuple[Any, ...]:
     import numpy as np
 
     cube = np.zeros((1, 1, 1))
-    return (*[cube] * 5, np.zeros((1, 1)), cube, np.zeros(1, dtype=np.int64), cube, cube)
+    of_gains = (cube, cube, cube, cube)
+    return (of_gains, cube, np.zeros((1, 1)), cube, np.zeros(1, dtype=np.int64), cube, cube)
 
 
 _running: list[subprocess.Popen[bytes]] = []  # held: the pipe would be closed with the object
