@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import PPoly
 
 from tests.helpers import come_back
 from tests.physics.test_strapdown_coning import residual
@@ -16,6 +17,7 @@ from truenorth.simulation.manoeuvres import accelerate, climb, s_turn, straight,
 from truenorth.simulation.profile import Ramp, profile, pulse
 from truenorth.simulation.route import Driving, route
 from truenorth.simulation.sea import Hull, WaveSpectrum, narrow_band, sea_motion
+from truenorth.simulation.tones import cosines
 from truenorth.simulation.turntable import Hold, positions, turntable
 
 PLACE = Position.from_degrees(45.0, 10.0, 100.0)
@@ -248,3 +250,22 @@ def test_ramps_and_pulses_are_smooth_and_whole():
 def test_what_cannot_move_so_is_refused(make, words):
     with pytest.raises(UsageError, match=words):
         make()
+
+
+def test_four_columns_of_times_are_as_each_by_itself():
+    """The nodes of the quadrature share registers, two tones at once; of steps that differ each column goes its own way."""
+    swell = narrow_band(0.02, 9.0, 0.2, rng(), components=7)
+    times = np.arange(200)[:, None] / 100 + np.array([0.001, 0.003, 0.007, 0.009])
+    uneven = times + np.where(np.arange(200) > 150, 0.004, 0.0)[:, None]
+    for t in (times, uneven):
+        for together, own in zip(cosines(swell, t), zip(*(cosines(swell, t[:, [m]]) for m in range(4))), strict=True):
+            np.testing.assert_array_equal(together, np.hstack(own))
+
+
+def test_a_profile_is_its_polynomials():
+    """Also beyond its ends, at its breaks, and at times in any order."""
+    speed = profile(0.3, [Ramp(1.0, 4.0, 2.0, 1.0), Ramp(7.0, 3.0, -1.0, 0.4)])
+    piece = PPoly(speed.coefficients, speed.breaks)
+    for x in (rng().uniform(-5.0, 20.0, (50, 4)), speed.breaks, np.array(2.5)):
+        for k, found in enumerate(speed(x)):
+            np.testing.assert_array_equal(found, piece.derivative(k)(x) if k else piece(x))

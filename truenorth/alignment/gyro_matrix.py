@@ -184,7 +184,7 @@ def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, fine: SwayAlignment,
     Each round tries, from the best so far, a matrix that is left a little open and one that is wide open, and a step to what the
     filter's innovations show. A motion of the base takes a part of a matrix up: left open it may come to rest where the log is less
     likely than as given; the steps go on with a motion that is fitted to each, and are too short. Where a push explains more
-    than the first matrices do, it is none.
+    than the first matrices do, it is none. A round that makes the log likelier by no more than chance is the last.
     """
     best, as_given = _Found(np.zeros((3, 3)), np.zeros((3, 3)), fine, np.inf), likelihood(fine)
     for turn in range(ROUNDS):
@@ -195,9 +195,9 @@ def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, fine: SwayAlignment,
         if better.pushed > _likelihood(better) - as_given:
             break
         better = max(better, _left_open(record, best, _opened(imu, OPEN[1]), anew, seen), key=_likelihood)
-        if better is best:
+        gained, best = _likelihood(better) - _likelihood(best), better
+        if turn > 0 and may_be_chance(gained):
             break
-        best = better
         if best.pushed <= limit("pushed in step") * (_likelihood(best) - as_given):
             break
     return best, as_given

@@ -108,12 +108,24 @@ def dcm_from_quaternion(q: ArrayLike) -> Array:
 def dcm_from_euler(heading: ArrayLike, pitch: ArrayLike, roll: ArrayLike) -> Array:
     """``C_nb = Rz(-heading) Rx(pitch) Ry(roll)``, (..., 3, 3), of angles in rad."""
     h, p, r = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in (heading, pitch, roll)))
-    sh, ch, sp, cp, sr, cr = np.sin(h), np.cos(h), np.sin(p), np.cos(p), np.sin(r), np.cos(r)
     C = np.empty((*h.shape, 3, 3))
-    C[..., 0, 0], C[..., 0, 1], C[..., 0, 2] = ch * cr + sh * sp * sr, sh * cp, ch * sr - sh * sp * cr
-    C[..., 1, 0], C[..., 1, 1], C[..., 1, 2] = -sh * cr + ch * sp * sr, ch * cp, -sh * sr - ch * sp * cr
-    C[..., 2, 0], C[..., 2, 1], C[..., 2, 2] = -cp * sr, sp, cp * cr
+    sines, cosines = (np.sin(h), np.sin(p), np.sin(r)), (np.cos(h), np.cos(p), np.cos(r))
+    _write_elements(np.moveaxis(C, (-2, -1), (0, 1)), sines, cosines)
     return C
+
+
+def dcm_elements(sines: Array, cosines: Array) -> Array:
+    """The same, (3, 3, ...), of the sines and cosines (3, ...) of heading, pitch and roll: element by element in memory."""
+    C = np.empty((3, *sines.shape))
+    _write_elements(C, sines, cosines)
+    return C
+
+
+def _write_elements(C: Array, sines: Any, cosines: Any) -> None:
+    (sh, sp, sr), (ch, cp, cr) = sines, cosines
+    C[0, 0], C[0, 1], C[0, 2] = ch * cr + sh * sp * sr, sh * cp, ch * sr - sh * sp * cr
+    C[1, 0], C[1, 1], C[1, 2] = -sh * cr + ch * sp * sr, ch * cp, -sh * sr - ch * sp * cr
+    C[2, 0], C[2, 1], C[2, 2] = -cp * sr, sp, cp * cr
 
 
 def euler_from_dcm(C_nb: ArrayLike) -> tuple[Array, Array, Array]:

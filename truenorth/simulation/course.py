@@ -125,10 +125,10 @@ class Course(Motion):
             coefficients = np.concatenate([at_knots, powers], axis=1)[:, ::-1]
             return at_knots + length * (rate @ TO_NODES.T), PPoly(np.ascontiguousarray(coefficients.T), knots)
 
-        alt, height = integral(self.position.alt, v[..., 2])
+        alt, height = integral(self.position.alt, v[2])
         lat, before = np.full_like(alt, self.position.lat), np.inf
         for _ in range(50):
-            new, latitude = integral(self.position.lat, v[..., 1] / (radii(lat)[0] + alt))
+            new, latitude = integral(self.position.lat, v[1] / (radii(lat)[0] + alt))
             change = float(np.max(np.abs(new - lat)))
             lat = new
             if change < 1e-16 or change >= before:
@@ -136,7 +136,7 @@ class Course(Motion):
             before = change
         if np.max(np.abs(lat)) > math.radians(89.5):
             raise UsageError("the course comes within half a degree of a pole, where east has no meaning; turn before")
-        _, longitude = integral(self.position.lon, v[..., 0] / ((radii(lat)[1] + alt) * np.cos(lat)))
+        _, longitude = integral(self.position.lon, v[0] / ((radii(lat)[1] + alt) * np.cos(lat)))
         return latitude, longitude, height
 
     def _times_at(self, marks: Array) -> Array:
@@ -281,15 +281,13 @@ def check_leg(leg: Leg, speed: float) -> None:
 
 
 def _velocity(heading: Any, slope: Any, V: Array, dV: Array) -> tuple[Array, Array]:
-    """Velocity in n and its derivative, (..., 3), of track and slope (each with its derivatives) and speed."""
+    """Velocity in n and its derivative, (3, ...), of track and slope (each with its derivatives) and speed."""
     (h, dh, _), (g, dg, _) = heading, slope
     sh, ch, sg, cg = np.sin(h), np.cos(h), np.sin(g), np.cos(g)
-    ahead = np.stack([cg * sh, cg * ch, sg], -1)
-    across = np.stack([cg * ch, -cg * sh, np.zeros_like(sg)], -1)
-    upward = np.stack([-sg * sh, -sg * ch, cg], -1)
-    v = V[..., None] * ahead
-    a = dV[..., None] * ahead + V[..., None] * (dh[..., None] * across + dg[..., None] * upward)
-    return v, a
+    east, north = cg * sh, cg * ch
+    v = V * np.stack([east, north, sg])
+    turning = np.stack([dh * north - dg * (sg * sh), -dh * east - dg * (sg * ch), dg * cg])
+    return v, dV * np.stack([east, north, sg]) + V * turning
 
 
 def _by_time(signal: tuple[Array, Array, Array], V: Array, dV: Array) -> tuple[Array, Array, Array]:

@@ -109,7 +109,8 @@ def turned(at: MotionStates, angles: Array, rates: Array, accelerations: Array) 
     """
     C_bs = dcm_from_euler(*angles)
     C_sb = np.swapaxes(C_bs, -1, -2)
-    w_bs, dw_bs = body_rates(angles, rates, accelerations)
+    own = body_rates(np.sin(angles), np.cos(angles), rates, accelerations)
+    w_bs, dw_bs = (np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in own)
     w_ib, dw_ib, f = (np.einsum("...ij,...j->...i", C_sb, x) for x in (at.w_ib_b, at.dw_ib_b, at.f_b))
     return MotionStates(
         time=at.time,

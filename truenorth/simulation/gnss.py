@@ -141,9 +141,9 @@ def place_of(at: MotionStates, arm: Any) -> tuple[Array, Array, Array, Array]:
     w_in_n = earth_rate_n(at.lat) + transport_rate_n(at.lat, at.alt, at.v_n)
     w_nb_b = at.w_ib_b - np.einsum("...ji,...j->...i", at.C_nb, w_in_n)
     away, moving = at.C_nb @ r, np.einsum("...ij,...j->...i", at.C_nb, np.cross(w_nb_b, r))
-    still = np.zeros_like(away)
-    lat, lon, alt, v_n, _ = displaced((at.lat, at.lon, at.alt, at.v_n, still), (away, moving, still))
-    return lat, lon, alt, v_n
+    away, moving, v_n, still = (np.moveaxis(x, -1, 0) for x in (away, moving, at.v_n, np.zeros_like(away)))
+    lat, lon, alt, v_n, _ = displaced((at.lat, at.lon, at.alt, v_n, still), (away, moving, still))
+    return lat, lon, alt, np.ascontiguousarray(np.moveaxis(v_n, 0, -1))
 
 
 def moved(lat: Array, lon: Array, alt: Array, error: Array) -> tuple[Array, Array, Array]:

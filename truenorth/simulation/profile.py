@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.core.compiled import compiled
+
 Array = NDArray[np.float64]
 
 
@@ -26,19 +28,28 @@ class Profile:
 
     def __call__(self, x: ArrayLike) -> tuple[Array, Array, Array]:
         """Value, first and second derivative at `x`, of any shape."""
-        piece, first, second = self._pieces
-        return piece(x), first(x), second(x)
+        x = np.asarray(x, dtype=np.float64)
+        found = np.empty((3, x.size))
+        _evaluate(x.ravel(), self.breaks, *self._pieces, found)
+        value, first, second = (row.reshape(x.shape) for row in found)
+        return value, first, second
 
     @cached_property
-    def _pieces(self) -> tuple[Any, Any, Any]:
-        from scipy.interpolate import PPoly
-
-        piece = PPoly(self.coefficients, self.breaks)
-        return piece, piece.derivative(1), piece.derivative(2)
+    def _pieces(self) -> tuple[Array, NDArray[np.int64]]:
+        """Coefficients (K, D, 3) of value and derivatives, the lowest power first; how many of each piece are not zero, (K,)."""
+        c = self.coefficients[::-1].T
+        power = np.arange(c.shape[1], dtype=np.float64)
+        found = np.zeros((*c.shape, 3))
+        found[..., 0] = c
+        found[:, :-1, 1] = c[:, 1:] * power[1:]
+        found[:, :-2, 2] = c[:, 2:] * (power[2:] * power[1:-1])
+        return found, np.max(np.where(c != 0.0, 1 + np.arange(c.shape[1]), 0), axis=1)
 
     def integral(self) -> Profile:
         """The antiderivative, zero at the first break."""
-        whole = self._pieces[0].antiderivative()
+        from scipy.interpolate import PPoly
+
+        whole = PPoly(self.coefficients, self.breaks).antiderivative()
         return Profile(np.asarray(whole.x), np.asarray(whole.c))
 
 
@@ -104,3 +115,21 @@ def pulse(start: float, stop: float, fade: float) -> Profile:
     """Zero, then one between `start` and `stop`, then zero; fading in and out inside the window."""
     fades = [Ramp(start, fade, 1.0, 0.5 * fade), Ramp(stop - fade, fade, -1.0, 0.5 * fade)]
     return profile(0.0, fades)
+
+
+@compiled
+def _evaluate(x: Any, breaks: Any, pieces: Any, sizes: Any, found: Any) -> None:
+    """Value and derivatives (3, N) at `x` (N,), of which neighbours are mostly of one piece."""
+    last = len(sizes) - 1
+    piece = 0
+    for k in range(len(x)):
+        if not breaks[piece] <= x[k] < breaks[piece + 1]:
+            piece = min(max(np.searchsorted(breaks, x[k], "right") - 1, 0), last)
+        away = x[k] - breaks[piece]
+        value, first, second, power = 0.0, 0.0, 0.0, 1.0
+        for j in range(sizes[piece]):
+            value += pieces[piece, j, 0] * power
+            first += pieces[piece, j, 1] * power
+            second += pieces[piece, j, 2] * power
+            power *= away
+        found[0, k], found[1, k], found[2, k] = value, first, second

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.simulation.motion import Kinematics, Motion, displaced
+from truenorth.simulation.motion import Kinematics, Motion, displaced, staying
 from truenorth.simulation.profile import Profile, pulse
 from truenorth.simulation.tones import Tone, Triple, cosines, shortest, sines
 
@@ -71,12 +71,13 @@ class Sway(_Tones, Motion):
             cosines(self.pitch_tones, t, self.pitch),
             cosines(self.roll_tones, t, self.roll),
         )
-        shifts = [sines(tones, t) for tones in (self.east_tones, self.north_tones, self.up_tones)]
-        east_north_up, velocity, acceleration = (np.stack(x, -1) for x in zip(*shifts, strict=True))
         values, rates, accelerations = (np.stack(x) for x in zip(*angles, strict=True))
-        place, still, at_rest = self.position, np.zeros_like(t), np.zeros((*t.shape, 3))
-        fixed = place.lat + still, place.lon + still, place.alt + still, at_rest, at_rest
-        path = displaced(fixed, (east_north_up, velocity, acceleration))
+        path = staying(self.position, t)
+        moves = self.east_tones, self.north_tones, self.up_tones
+        if any(moves):
+            shifts = [sines(tones, t) for tones in moves]
+            east_north_up, velocity, acceleration = (np.stack(x) for x in zip(*shifts, strict=True))
+            path = displaced(path, (east_north_up, velocity, acceleration))
         return Kinematics(values, rates, accelerations, *path)
 
 
@@ -140,9 +141,10 @@ class Disturbed(_Tones, Motion):
         """The motion beneath plus the tones."""
         base = self.motion.kinematics(t)
         turns = (self.heading_tones, self.pitch_tones, self.roll_tones)
-        angles = [self._faded(cosines(tones, t), t) for tones in turns]
-        shifts = [self._faded(sines(x, t), t) for x in (self.east_tones, self.north_tones, self.up_tones)]
-        east_north_up, velocity, acceleration = (np.stack(x, -1) for x in zip(*shifts, strict=True))
+        envelope = None if self._envelope is None else self._envelope(t)
+        angles = [_faded(cosines(tones, t), envelope) for tones in turns]
+        shifts = [_faded(sines(x, t), envelope) for x in (self.east_tones, self.north_tones, self.up_tones)]
+        east_north_up, velocity, acceleration = (np.stack(x) for x in zip(*shifts, strict=True))
         values, rates, accelerations = (np.stack(x) for x in zip(*angles, strict=True))
         path = displaced((base.lat, base.lon, base.alt, base.v, base.a), (east_north_up, velocity, acceleration))
         return Kinematics(base.angles + values, base.rates + rates, base.accelerations + accelerations, *path)
@@ -152,13 +154,14 @@ class Disturbed(_Tones, Motion):
         fixed = self.motion.arm(t)
         if not any(self.mount_tones):
             return fixed
-        moving = [self._faded(cosines(tones, t), t) for tones in self.mount_tones]
+        envelope = None if self._envelope is None else self._envelope(t)
+        moving = [_faded(cosines(tones, t), envelope) for tones in self.mount_tones]
         r, dr, ddr = (f + np.stack(x, -1) for f, x in zip(fixed, zip(*moving, strict=True), strict=True))
         return r, dr, ddr
 
-    def _faded(self, signal: Triple, t: Array) -> Triple:
-        if self._envelope is None:
-            return signal
-        x, dx, ddx = signal
-        e, de, dde = self._envelope(t)
-        return e * x, de * x + e * dx, dde * x + 2 * de * dx + e * ddx
+
+def _faded(signal: Triple, envelope: Triple | None) -> Triple:
+    if envelope is None:
+        return signal
+    (x, dx, ddx), (e, de, dde) = signal, envelope
+    return e * x, de * x + e * dx, dde * x + 2 * de * dx + e * ddx

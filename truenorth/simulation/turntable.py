@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.simulation.motion import Kinematics, Motion
+from truenorth.simulation.motion import Kinematics, Motion, staying
 from truenorth.simulation.profile import Profile, Ramp, profile
 
 Array = NDArray[np.float64]
@@ -47,11 +47,7 @@ class Turntable(Motion):
         angles, rates, accelerations = (
             np.stack(x) for x in zip(self.heading(t), self.pitch(t), self.roll(t), strict=True)
         )
-        still, at_rest = np.zeros_like(t), np.zeros((*t.shape, 3))
-        place = self.position
-        return Kinematics(
-            angles, rates, accelerations, place.lat + still, place.lon + still, place.alt + still, at_rest, at_rest
-        )
+        return Kinematics(angles, rates, accelerations, *staying(self.position, t))
 
 
 def turntable(
