@@ -10,7 +10,7 @@ from benchmarks.honesty import moving
 from benchmarks.honesty.harness import Log, simulated
 from tests.alignment.test_in_motion_learnt import track_of
 from truenorth.alignment import in_motion
-from truenorth.alignment.in_motion_untold import fits_worse
+from truenorth.alignment.in_motion_passes import fits_worse
 from truenorth.errors.group import Group
 from truenorth.quality.slow_aids import FIXES, LEAST, SPEEDS, Lasting
 

@@ -23,11 +23,11 @@ from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitud
 from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.alignment.in_motion_moments import two_moments, with_swing_apart
 from truenorth.alignment.in_motion_open import open_track
-from truenorth.alignment.in_motion_passes import Pass, begun, once_more
+from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
-from truenorth.alignment.in_motion_untold import UNTOLD, fits_worse, hidden_from, of_level
+from truenorth.alignment.in_motion_untold import UNTOLD, hidden_from, of_level
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.core.attitude import dcm_from_euler
+from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.state.layout import PHI
+from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -127,3 +129,11 @@ def turn_between(C: Array, D: Array) -> float:
     """From D to C about the vertical, rad."""
     R = C @ D.T
     return float(math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
+
+
+def fits_worse(track: Track, other: Track) -> bool:
+    """Whether the log speaks for the first of two tracks by more than chance does, or the other rejects more of it."""
+    rejected = sum(
+        int(np.sum(b.used)) < int(np.sum(a.used)) for a, b in zip(track.residuals, other.residuals, strict=True)
+    )
+    return rejected > 0 or likelihood_ratio(other.residuals, track.residuals) > limit("rival")

@@ -5,7 +5,8 @@ that, any heading is as good as another, and so is the level that goes with it. 
 know that: with each correction the columns of biases, which are fixed to the body, turn against those of tilts, which are not, and
 that passes for knowledge of both. A consumer IMU that drove S-turns knew its level to .3 deg and was up to ten of these off.
 
-So the heading is held: it is where north shall be, not an error. A pass so held finds level and biases as the turns between them
+Of one that hardly turns level is that of gravity (:mod:`truenorth.alignment.in_motion_level`). Where the log speaks against that,
+the heading is held: it is where north shall be, not an error. A pass so held finds level and biases as the turns between them
 tell, and the passes go on until the level that the next begins with is the one that it leads back to. Each is linear about the
 biases of the one before. That they are about zero, as the specification says, is given to its end, so that it counts once: passes
 that begin about what was found, with the sigma of the specification, go as far from zero as the log lets them. What the earth's
@@ -21,16 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.in_motion_level import with_level_biases
-from truenorth.alignment.in_motion_passes import Pass, begun, once_more
+from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import HEADINGS, Guess, led_back
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import DataError
-from truenorth.estimate.rivals import likelihood_ratio, misfit
+from truenorth.estimate.rivals import misfit
 from truenorth.state.layout import BA, BG, DV, PHI
-from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -165,11 +165,3 @@ def _by_gravity(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask
     except DataError:  # the filter broke down
         return None
     return None if fits_worse(found.track, other) else (held, last.guess, other)
-
-
-def fits_worse(track: Track, other: Track) -> bool:
-    """Whether the log speaks for the first of two tracks by more than chance does, or the other rejects more of it."""
-    rejected = sum(
-        int(np.sum(b.used)) < int(np.sum(a.used)) for a, b in zip(track.residuals, other.residuals, strict=True)
-    )
-    return rejected > 0 or likelihood_ratio(other.residuals, track.residuals) > limit("rival")
