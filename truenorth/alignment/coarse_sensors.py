@@ -36,6 +36,8 @@ from truenorth.core.indexing import indexer_turns
 from truenorth.errors.staying import BIASES
 from truenorth.estimate.staying import KnownSensors, prior_of
 from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import ANY_EFFECT, Evidence, Figure
+from truenorth.state.limits import limit
 from truenorth.strapdown.inertial import InertialIntegrals, integrate
 
 Array = NDArray[np.float64]
@@ -80,6 +82,22 @@ def known_sensors(start: CoarseStart, C_sb: Array, turned: ImuSpec | None) -> Kn
     # They were so on the average of the log.
     known.P[GYRO_BIAS, GYRO_BIAS] += start.model.gyro_rate_walk**2 * start.record.duration * np.eye(3)
     return known
+
+
+def matrix_evidence(start: CoarseStart, spec: ImuSpec) -> list[Evidence]:
+    """The entry of the gyros' matrix that is furthest beyond its specification: units, axes, signs, or the encoder's."""
+    known = start.sensors
+    if known is None or len(known.mean) == BIASES.stop - BIASES.start:
+        return []
+    M = known.mean[GYRO_MATRIX].reshape(3, 3)
+    allowed = np.where(np.eye(3, dtype=bool), spec.gyro_scale_factor, spec.gyro_misalignment)
+    times = np.abs(M) / np.maximum(allowed, math.ulp(0.0))
+    row, column = divmod(int(np.argmax(times)), 3)
+    if times[row, column] < limit("specification"):
+        return []
+    figures: dict[str, Figure] = {"axis": "xyz"[row], "about": "xyz"[column], "imu": spec.name}
+    figures |= {"found": float(M[row, column]), "allowed": float(allowed[row, column])}
+    return [Evidence("encoder.gyro_matrix", figures, "unknown", ANY_EFFECT, ("imu_axes", "units"))]
 
 
 def _turned(integrals: InertialIntegrals, C_sb: Array, *, small: bool) -> Array:

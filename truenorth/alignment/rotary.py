@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.alignment.accel_scale import accel_scale_evidence
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
-from truenorth.alignment.coarse_sensors import calibrated
+from truenorth.alignment.coarse_sensors import calibrated, matrix_evidence
 from truenorth.alignment.encoder_angles import angles_at, carried_angles
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
@@ -180,7 +180,7 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
-    evidence = _of_encoder(record, encoder, axes, task, spec)
+    evidence = _of_encoder(start, encoder, axes, task, spec)
     evidence += [] if encoder is None else jump_evidence(carried.time, carried.by_gyros, carried.turned, carried.steps)
     evidence += _of_filter(answer, fine, spec, task, given=given is not None)
     if isinstance(fine, SwayAlignment):
@@ -225,16 +225,18 @@ def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task
 
 
 def _of_encoder(
-    record: ImuRecord, encoder: EncoderRecord | None, axes: Sequence[str], task: Task, spec: ImuSpec
+    start: CoarseStart, encoder: EncoderRecord | None, axes: Sequence[str], task: Task, spec: ImuSpec
 ) -> list[Evidence]:
     """What the encoder's angles and the record say against each other."""
+    record = start.record
     if encoder is None:
         return record_evidence(record, task.motion, imu=spec)
     gyro_bias = math.sqrt(float(spec.bias_variance[:3].max()))
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
     given = readings.pop("given")
     found = encoder_evidence(record, given, readings, gyro_bias)
-    found += record_evidence(record, task.motion, given, imu=spec)
+    found += record_evidence(record, task.motion, given, imu=spec, right=start.right_record())
+    found += matrix_evidence(start, spec)
     found += codes_evidence(record, task.position.lat) + hum_evidence(record, task.position.lat, spec)
     if len(axes) == 2:
         outer, inner = np.abs(np.diff(np.unwrap(encoder.angles, axis=0)[[0, -1]], axis=0)[0])

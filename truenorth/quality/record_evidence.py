@@ -39,6 +39,7 @@ def record_evidence(
     *,
     sound: bool = False,
     imu: ImuSpec | None = None,
+    right: ImuRecord | None = None,
 ) -> list[Evidence]:
     """Evidence of a record on a base that stays where it is.
 
@@ -52,6 +53,8 @@ def record_evidence(
         Whether clock, logging and range are known to be without fault, and the units and axes of the gyros.
     imu : ImuSpec, optional
         Whose accelerometers' biases pass for gravity that turns where the IMU does.
+    right : ImuRecord, optional
+        The same record without the errors of its sensors that an encoder shows: poor gyros turn by degrees in seconds.
     """
     found = [] if sound else sampling_evidence(record, turns=motion.overall not in QUIET)
     doubts = unit_findings(record, motion, gyros=not sound)
@@ -64,7 +67,7 @@ def record_evidence(
         return found
     found += vibration_evidence(record)
     accel_bias = 0.0 if imu is None else math.sqrt(float(imu.bias_variance[3:].max()))
-    tilt = check_tilt(record, C_sb, accel_bias)
+    tilt = check_tilt(right or record, C_sb, accel_bias)
     return found if tilt is None else found + tilt.evidence()
 
 

@@ -148,6 +148,10 @@ OF_SENSORS = {
         "accelerometer drifts by {moved:ug|.3g} ug, which moves heading by {heading:angle}, or the base tilts as steadily"
     ),
     # ---- an indexer's angles, and aids that contradict themselves
+    "encoder.gyro_matrix": (
+        "by the encoder's angles the {axis} gyro shows turns about {about} with an error of {found:+.1%}, where the specification "
+        "({imu:imu}) allows {allowed:.1%}"
+    ),
     "encoder.turns": (
         "the base would turn by {given:deg/s|.2g} deg/s RMS with these angles of the indexer, and by {best:deg/s|.2g} deg/s with "
         "{reading:term}"
