@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from typer.testing import CliRunner
 
 from tests.runs import few_and_all, some
 from truenorth.campaign.fault_benches import BENCHES, misses
-from truenorth.campaign.fault_limits import LEAST_RATIO, UNSEEN, ratio_on_sway
+from truenorth.campaign.fault_limits import LEAST_RATIO, UNSEEN, ratio_on_sway, unseen
 from truenorth.campaign.fault_pages import keeper, page, read_trials
 from truenorth.campaign.faults import FAULTS, SOUND, Trial, faults_of, run_faults, table
 from truenorth.cli import app
@@ -301,3 +302,15 @@ def test_a_scale_factor_under_gravity_is_no_bias_beyond_its_specification():
     """Drawn: 164 ug of bias and 130 ppm of scale factor, where both are 50: 283 ug as the filter finds it."""
     inputs, _ = BENCHES["odometer"].draw(8204, 7)
     assert BENCHES["odometer"].align(inputs).status == "aligned"
+
+
+def test_the_page_has_what_no_log_can_show_as_the_command_writes_it():
+    rows = page([]).strip().split("\n\n")[-1]
+    assert rows.startswith("| cannot be seen |")
+    assert rows in (Path(__file__).parents[2] / "docs/faults.md").read_text(encoding="utf-8")
+
+
+def test_the_scale_of_a_gyro_on_a_sway_is_never_unseen():
+    """A motion fitted to the spoilt log takes a part of it up: by the filter of the answer it may seem that none is there."""
+    assert unseen("swaying", "gyro scale", "1.100 of z", -245.0) is None
+    assert unseen("swaying", "gyro bias step", "", 10.0)

@@ -21,6 +21,7 @@ from truenorth.campaign.fault_limits import (
     LIKE_MOTION,
     ON_THE_MOVE,
     REST,
+    SHOWN_BY_SWAY,
     SIGNS,
     UNSEEN,
 )
@@ -139,7 +140,7 @@ def _unseen() -> list[str]:
     lines = ["| cannot be seen | by | why |", "| --- | --- | --- |"]
     lines += [f"| {u.fault}{_sizes(u.size)} | {', '.join(u.procedures)} | {u.why} |" for u in UNSEEN]
     lines.append(f"| {', '.join(LIKE_HEADING)} | {', '.join(REST)} | {BY_MEANS} |")
-    biases = [name for name in LIKE_MOTION if name.startswith(("gyro", "accel"))]
+    biases = [name for name in LIKE_MOTION if name.startswith(("gyro", "accel")) and name != SHOWN_BY_SWAY]
     lines.append(f"| {', '.join(biases)} | swaying | {BY_STAYING} |")
     lines.append(f"| {', '.join(LATE)} | transfer, attitude | {BY_LATENCY} |")
     lines.append(f"| {', '.join(SIGNS)} | transfer | {BY_SIGN} |")

@@ -174,7 +174,8 @@ class ByMaster:
     lever_arm_sigma: Annotated[
         float | None,
         option(
-            "What the arm from the master to the IMU is uncertain by, m; 0: known. Without it 1 of --lever-arm, else 5."
+            "What the arm from the master to the IMU is uncertain by, m; 0: known. Without it 1 m; of an arm not given 5 m "
+            "where the log contradicts 1 m."
         ),
         Sets("on master", plain("lever_arm_sigma")),
     ] = None
