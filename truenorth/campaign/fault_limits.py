@@ -50,14 +50,14 @@ BY_MEANS = (
 )
 BY_LATENCY = (
     f"measured, trial by trial: the master's measurements prefer gyros of one moment by less than 25 ({RATIO}). Gyros that are "
-    "late by d turn heading by d times the rate while a turn lasts. Straight flight shows a master by velocity no heading, so that only "
-    "one turn against another parts it from a delay of the slave, which is not known either. By attitude as well, a delay of "
+    "late by d turn heading by d times the rate while a turn lasts. Straight flight shows a master by velocity no heading, so that "
+    "only one turn against another parts it from a delay of the slave, which is not known either. By attitude as well, a delay of "
     "milliseconds is less than the scatter of the master's attitudes"
 )
 BY_SIGN = (
     f"measured, trial by trial: the master's velocities prefer the gyro of the right sign by less than 25 ({RATIO}). In level "
-    "flight gyros about level axes see the earth's rate alone, up to 15 deg/h. The wrong sign is an error of twice as much that changes "
-    "with the course. Over legs of half a minute it moves a velocity by 0.2 m/s, as an unknown tilt and bias do"
+    "flight gyros about level axes see the earth's rate alone, up to 15 deg/h. The wrong sign is an error of twice as much that "
+    "changes with the course. Over legs of half a minute it moves a velocity by 0.2 m/s, as an unknown tilt and bias do"
 )
 LEAST_RATIO = 25.0
 ON_THE_MOVE = ("odometer", "gnss", "transfer", "attitude", "navigate")
