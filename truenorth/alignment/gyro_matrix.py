@@ -105,6 +105,7 @@ def gyro_matrix_evidence(
         return []
     moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, found.fine))))
     key, figures = _named(found.M, found.sigma)
+    figures["ratio"] = gained
     turned = key == "tilt.turned" and float(figures["turn"]) > SHOWN * float(figures["sigma"])
     askew = _askew(fine, found.M) if turned else 0.0
     if not np.any(np.append(moved, askew) > limit("negligible") * np.sqrt(np.diag(fine.P)[PHI])[[0, 1, 2, 0]]):
