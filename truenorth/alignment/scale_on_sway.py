@@ -14,6 +14,7 @@ In a sea that pushes a base as much as a scale factor would, the two are one, an
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -68,18 +69,18 @@ def scale_on_sway_evidence(
     if not shown:
         return []
     first = last = max(shown, key=lambda item: item.ratio)
-    best, scale, factor = fine, first, 1.0
+    best, scale, factor, put_right = fine, first, 1.0, 1.0
     for _ in range(ROUNDS):
         factor *= 1.0 - min(max(last.size, -LARGEST), LARGEST)
         right = record.accel.copy()
         right[:, first.axis] *= factor
         other = anew(replace(record, accel=right))
         last = _responses(other)[first.axis]
-        if likelihood(other) > likelihood(best):
-            best, scale = other, last._replace(size=1.0 / factor - 1.0)
+        if _as_measured(other, factor) > _as_measured(best, put_right):
+            best, put_right, scale = other, factor, last._replace(size=1.0 / factor - 1.0)
         if may_be_chance(last.ratio):
             break
-    gained = likelihood(best) - likelihood(fine)
+    gained = _as_measured(best, put_right) - likelihood(fine)
     if may_be_chance(gained) or in_step(best) > limit("pushed in step") * gained:
         return []
     moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, best))))
@@ -93,6 +94,15 @@ def scale_on_sway_evidence(
         "level": effect.level,
     }
     return [Evidence("bias.accel_scale", figures, "bounded", effect, ("specification", "units"))]
+
+
+def _as_measured(fine: FineAlignment, factor: float) -> float:
+    """Twice the logarithm of the likelihood of the force as measured, of which one axis was put right by a factor.
+
+    A density of numbers that are ``factor`` times as large is larger by that for each. Without it a level axis that is put right to
+    nothing would be the likeliest: no motion is left that it could contradict.
+    """
+    return likelihood(fine) + 2.0 * len(fine.integrals.intervals) * math.log(factor)
 
 
 def _responses(fine: FineAlignment) -> list[_Response]:
