@@ -24,7 +24,10 @@ Array = NDArray[np.float64]
 
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 0.7
 QUIETEST = 1e-7  # m/s: white motion of a base that does not move
+CLEAR = 10.0  # times what the sensors' random walks make there: a peak that is the base's
 PEAK_WIDTH = 4  # bins on either side of a peak that belong to it
+# Damping with which the search for a sea begins: it narrows as it goes on, but never leaves a single line of a sea's many.
+BROAD = (0.1, 0.3)
 LINE = 1e-8  # damping with which the search for a line begins
 SCORINGS, TRIALS, POLISHES = 25, 6, 12  # iterations at most
 DIFFERENCE = 1e-5  # of a logarithm, for derivatives
@@ -82,8 +85,13 @@ def _with_one_more(motion: AxisMotion, series: Series, order: int, damping: floa
 
 def _at_peaks(series: Series, count: int, order: int, damping: float | None = None) -> AxisMotion:
     """So many oscillators at the highest maxima of the smoothed periodogram."""
-    smooth = np.convolve(series.periodogram, np.ones(PEAK_WIDTH + 1) / (PEAK_WIDTH + 1), "same")
+    smooth, walked = (
+        np.convolve(x, np.ones(PEAK_WIDTH + 1) / (PEAK_WIDTH + 1), "same") for x in (series.periodogram, series.walked)
+    )
     smooth[: LOWEST_BIN + 1] = 0.0
+    clear = smooth >= CLEAR * walked
+    if clear.any():
+        smooth[~clear] = 0.0
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(smooth, PEAK_WIDTH), 2 * PEAK_WIDTH + 1)
     peaks = np.flatnonzero((smooth >= windows.max(axis=1)) & (smooth > 0))
     peaks = peaks[np.argsort(smooth[peaks])[::-1]][:count]
@@ -109,7 +117,7 @@ def _oscillator_at(series: Series, peak: int, order: int, damping: float | None 
     width = math.sqrt(float(np.sum((w - centre) ** 2 * power) / np.sum(power)))
     sigma = math.sqrt(2.0 * float(np.sum(power)) / len(series.detrended))
     if damping is None:
-        return Oscillator(order, sigma, centre, float(np.clip(0.5 * width / centre, 1e-3, 0.3)))
+        return Oscillator(order, sigma, centre, float(np.clip(0.5 * width / centre, *BROAD)))
     return Oscillator(order, sigma, _line_frequency(series, centre), damping)
 
 

@@ -47,6 +47,14 @@ class Walks:
             np.array([[q * T + r * T**3 / 3, r * T**2 / 2], [r * T**2 / 2, r * T]]),
         )
 
+    def periodogram(self, frequencies: Array, interval: float) -> Array:
+        """Expected at frequencies (m,), rad/s, of a series with a trend taken out; its density at zero is infinite."""
+        difference = (2.0 * np.sin(0.5 * interval * frequencies[1:])) ** 2  # squared gain of it
+        velocity = self.velocity**2 * interval / difference
+        tilt = self.tilt**2 * interval**3 * (1.0 - difference / 6.0) / difference**2
+        density = velocity + tilt
+        return np.concatenate([density[:1], density])
+
 
 def parameters(motion: AxisMotion) -> tuple[Orders, Array]:
     """Orders and logarithms of a motion."""
@@ -88,17 +96,18 @@ class Series:
         spectrum = np.fft.rfft(taper, 2 * K)
         self.taper = np.fft.irfft(np.abs(spectrum) ** 2)[:K]  # its autocorrelation
         self.periodogram = np.abs(np.fft.rfft(taper * self.detrended)) ** 2
-        self.frequencies = 2 * np.pi * np.fft.rfftfreq(K, interval)
+        self.frequencies: Array = np.asarray(2 * np.pi * np.fft.rfftfreq(K, interval), dtype=np.float64)
+        self.walked = walks.periodogram(self.frequencies, interval)
         self.lags: Array = interval * np.arange(K, dtype=np.float64)
         self.known: dict[
             AxisMotion, float
         ] = {}  # minus twice the restricted log-likelihood of motions that a search ended in
 
     def expected(self, orders: Orders, logs: Array) -> Array:
-        """Expected periodograms (m, K // 2 + 1) of the tapered series, of motions with logarithms (m, 1 + 3 q)."""
+        """Expected periodograms (m, K // 2 + 1) of the tapered series, of motions with logarithms (m, 1 + 3 q) and the walks."""
         acf = np.zeros((len(logs), len(self.lags)))
         _folded_autocovariances(orders, *_values(logs), self.interval, self.taper, acf)
-        return np.maximum(np.fft.rfft(acf).real, 1e-30)
+        return np.maximum(np.fft.rfft(acf).real, 1e-30) + self.walked
 
     def whittle(self, expected: Array) -> float:
         """Minus twice the debiased Whittle log-likelihood, of an expected periodogram."""

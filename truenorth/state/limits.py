@@ -258,7 +258,11 @@ LIMITS: dict[str, Limit] = {
         "of the squares",
         "that a matrix of the gyros explains, which a push, or late gyros, may explain as well: it is in sigma then",
     ),
-    "matrix": Limit(1e-6, "1", "probability that sound gyros explain as many squares by a matrix of theirs"),
+    "matrix": Limit(
+        1e-4,
+        "1",
+        "probability that sound gyros explain as many squares by a matrix of theirs: from here on one is searched, which decides",
+    ),
     "vibrates": Limit(
         2.0,
         "variance of the gyros' noise",
