@@ -103,8 +103,8 @@ def _aligned(
             aid: list[Indexer] = []
             if isinstance(motion, Indexed) and method.method in INDEXER_METHODS:
                 aid, motion = [_indexer(plan, case, run, motion)], motion.motion  # the answer is the body's
-            # Where no faults can be, none are looked for.
-            known: dict[str, Any] = {"sound": True} if _is_sound(case.built) else {}
+            # Where no faults can be, none are looked for; an answer that is held against the truth is the end.
+            known: dict[str, Any] = {"sound": True, "goes_on": False} if _is_sound(case.built) else {}
             limit = plan.heading_limit
             answer = align(record, place, spec, aid=aid, method=method.method, heading_limit=limit, **known)
         errors = [
