@@ -11,7 +11,7 @@ import numpy as np
 
 from truenorth.aiding.aids import Gnss, Indexer, Odometer
 from truenorth.alignment import Alignment, align
-from truenorth.alignment.azimuth import AZIMUTH_METHODS
+from truenorth.alignment.assumptions import MOVING
 from truenorth.alignment.rotary import INDEXER_METHODS
 from truenorth.campaign.rows import Row
 from truenorth.core.attitude import rotation_vector_from_dcm
@@ -96,7 +96,7 @@ def _aligned(
         start = _truth_of(simulated.motion)(case.built.start)
         place = Position(float(start.lat), float(start.lon), float(start.alt))
         motion = simulated.motion
-        if method.method in ("in_motion", *AZIMUTH_METHODS):
+        if method.method in ("in_motion", *MOVING):
             assert spec is not None  # the plan sees to it
             answer = _in_motion(plan, case, run, method.method, spec, record, place)
         else:
