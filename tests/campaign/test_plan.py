@@ -4,6 +4,8 @@ from typing import get_args
 
 import pytest
 
+from truenorth.alignment.assumptions import MOVING
+from truenorth.alignment.azimuth import AZIMUTH_METHODS
 from truenorth.alignment.procedure import Method
 from truenorth.campaign import read_plan
 from truenorth.campaign.tuning import Search
@@ -44,6 +46,10 @@ def test_every_method_of_align_can_be_planned():
     plan = read_plan(PLAN | {"methods": list(get_args(Method))})
     assert "swaying" in [method.method for method in plan.methods]
     assert Search.model_fields["method"].annotation == Method
+
+
+def test_published_methods_on_the_move_are_known_without_their_filters():
+    assert tuple(MOVING) == AZIMUTH_METHODS
 
 
 def test_the_resolved_plan_is_the_same_plan():

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.fine import FineAlignment, attitude_history
+from truenorth.alignment.handover import hand_over
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import UNIFORM_SIGMA
@@ -62,6 +64,54 @@ def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Arr
         duration=task.record.duration,
         disturbance=np.full(3, np.nan),
         source=task.record.source,
+    )
+
+
+def answer_of(
+    task: Task,
+    fine: FineAlignment,
+    used: ImuSpec,
+    where: str,
+    P_bias: Array,
+    *,
+    sways: bool = False,
+    bent: Array | None = None,
+    goes_on: bool = True,
+) -> Alignment:
+    """The answer of a filter at the epoch asked for, with its history.
+
+    Parameters
+    ----------
+    task, fine, used, where
+    P_bias : (6, 6) array
+        Prior covariance of the biases.
+    sways : bool
+        Whether the base does.
+    bent : (3, 3) array, optional
+        More covariance of the misalignment.
+    goes_on : bool
+        Whether navigation may go on from the answer.
+    """
+    C_ib = task.epoch.attitude(fine.integrals.C_ib_at[0])
+    answer = at_epoch(task, used, where, *fine.misalignment_at(C_ib, task.epoch.elapsed))
+    if sways:
+        answer = replace(answer, phi_covariance=answer.phi_covariance + creep(task, task.record.duration))
+    history = make_history(task, fine, used, sways)
+    if bent is not None:
+        answer = replace(answer, phi_covariance=answer.phi_covariance + bent)
+        history = replace(history, phi_covariance=history.phi_covariance + bent)
+    variance, prior = fine.P.diagonal(), P_bias.diagonal()[3:]
+    accel_bias, accel_sigma = true_bias(fine.bias[3:], variance[BA], prior, used.bias_variance[3:])
+    return replace(
+        answer,
+        gyro_bias=fine.bias[:3],
+        gyro_bias_sigma=np.sqrt(variance[BG]),
+        accel_bias=accel_bias,
+        accel_bias_sigma=accel_sigma,
+        disturbance=fine.disturbance,
+        history=history,
+        pays_until=pays_until(history, answer, fine),
+        handover=hand_over(task, fine, answer) if goes_on else None,
     )
 
 

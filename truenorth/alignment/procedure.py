@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.against import against
-from truenorth.alignment.answer import at_epoch, creep, make_history, pays_until, without_heading
+from truenorth.alignment.answer import answer_of, at_epoch, without_heading
 from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
-from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
 from truenorth.alignment.brief_sway import bent_by_heading, may_swing_on_lines
 from truenorth.alignment.by_heave import weighed_by_heave
@@ -25,7 +24,7 @@ from truenorth.alignment.fine import BEND, CoarseStart, FineAlignment, fine_alig
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.from_means import SHORTEST_FILTER, from_means, level_from_means, turned_by
 from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
-from truenorth.alignment.handover import go_on, hand_over
+from truenorth.alignment.handover import go_on
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyro import late_gyro_evidence
@@ -56,7 +55,7 @@ from truenorth.coarse import coarse_covariance, dual_vector, oba
 from truenorth.coarse.uncertainty import own_motion
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.staying import BA, BG, StaticModel, gained_velocity
+from truenorth.errors.staying import BG, StaticModel, gained_velocity
 from truenorth.quality.density import specification_evidence
 from truenorth.quality.record_evidence import record_evidence, staying_evidence
 from truenorth.quality.regimes import MotionSummary
@@ -100,6 +99,7 @@ def align_base(
     heading_limit: float = HEADING_LIMIT,
     progress: Callable[[str], None] | None = None,
     sound: bool = False,
+    goes_on: bool = True,
 ) -> Alignment:
     """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying.
 
@@ -121,6 +121,8 @@ def align_base(
     sound : bool
         Whether the log is known to be without faults of clock, logging, range and the gyros' units and axes, and its noise to be
         one all along, as a simulated one is: then it is not looked at for them.
+    goes_on : bool
+        Whether rows that follow, or navigation, may go on from the answer: what only they need is made then.
 
     Raises
     ------
@@ -161,7 +163,7 @@ def align_base(
     elif chosen == "analytic":
         found = _Found(*from_means(task, spec))
     else:
-        found = _align_inertial(task, spec, chosen, means, sound)
+        found = _align_inertial(task, spec, chosen, means, sound, goes_on)
         if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit, inferred=True):
             chosen, why, found = "analytic", NO_NORTH, _Found(*level_from_means(task, spec))
         elif method == "auto" and spec is None and was_blind(task, found.answer.imu):
@@ -255,7 +257,9 @@ def _moves_on(task: Task, fine: FineAlignment) -> Array:
     return np.minimum(moved, limit("fastest base"))
 
 
-def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogCheck, sound: bool) -> _Found:
+def _align_inertial(
+    task: Task, spec: ImuSpec | None, method: str, means: LogCheck, sound: bool, goes_on: bool
+) -> _Found:
     lat, alt, rows = task.position.lat, task.position.alt, np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
     refined = method in ("kalman", "swaying", *FADING, *STATIONARY)
@@ -316,8 +320,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, means: LogChe
         fine = fine_align(start, integrals, picked, sways=swings)
     del integrals, filtered, coarse  # of the first pass; what follows takes memory
     short = swings and not sways and task.record.duration <= BEND
-    answer = answer_of(task, fine, used, where, P, sways, bent_by_heading(fine, lat) if short else None)
-    answer = replace(answer, ongoing=go_on(task, fine, start.model))
+    bent = bent_by_heading(fine, lat) if short else None
+    answer = answer_of(task, fine, used, where, P, sways=sways, bent=bent, goes_on=goes_on)
+    answer = replace(answer, ongoing=go_on(task, fine, start.model)) if goes_on else answer
     if turned is not None:  # the check knows no scale factors
         check = replace(check, rate_residual=np.zeros(2), rate_noise=np.full(2, math.inf))
     if spec is not None or turned is not None:
@@ -354,39 +359,6 @@ def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, 
         gyro_bias_sigma=found.bias_sigma[:3],
         accel_bias=np.where(known, found.bias[3:], answer.accel_bias),
         accel_bias_sigma=np.where(known, found.bias_sigma[3:], answer.accel_bias_sigma),
-    )
-
-
-def answer_of(
-    task: Task,
-    fine: FineAlignment,
-    used: ImuSpec,
-    where: str,
-    P_bias: Array,
-    sways: bool = False,
-    bent: Array | None = None,
-) -> Alignment:
-    """The answer of a filter at the epoch asked for, with its history; `bent` (3, 3) is more covariance of its misalignment."""
-    C_ib = task.epoch.attitude(fine.integrals.C_ib_at[0])
-    answer = at_epoch(task, used, where, *fine.misalignment_at(C_ib, task.epoch.elapsed))
-    if sways:
-        answer = replace(answer, phi_covariance=answer.phi_covariance + creep(task, task.record.duration))
-    history = make_history(task, fine, used, sways)
-    if bent is not None:
-        answer = replace(answer, phi_covariance=answer.phi_covariance + bent)
-        history = replace(history, phi_covariance=history.phi_covariance + bent)
-    variance, prior = fine.P.diagonal(), P_bias.diagonal()[3:]
-    accel_bias, accel_sigma = true_bias(fine.bias[3:], variance[BA], prior, used.bias_variance[3:])
-    return replace(
-        answer,
-        gyro_bias=fine.bias[:3],
-        gyro_bias_sigma=np.sqrt(variance[BG]),
-        accel_bias=accel_bias,
-        accel_bias_sigma=accel_sigma,
-        disturbance=fine.disturbance,
-        history=history,
-        pays_until=pays_until(history, answer, fine),
-        handover=hand_over(task, fine, answer),
     )
 
 

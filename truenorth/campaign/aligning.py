@@ -11,7 +11,7 @@ import numpy as np
 
 from truenorth.aiding.aids import Gnss, Indexer, Odometer
 from truenorth.alignment import Alignment, align
-from truenorth.alignment.azimuth import AZIMUTH_METHODS
+from truenorth.alignment.assumptions import MOVING
 from truenorth.alignment.rotary import INDEXER_METHODS
 from truenorth.campaign.rows import Row
 from truenorth.core.attitude import rotation_vector_from_dcm
@@ -96,15 +96,15 @@ def _aligned(
         start = _truth_of(simulated.motion)(case.built.start)
         place = Position(float(start.lat), float(start.lon), float(start.alt))
         motion = simulated.motion
-        if method.method in ("in_motion", *AZIMUTH_METHODS):
+        if method.method in ("in_motion", *MOVING):
             assert spec is not None  # the plan sees to it
             answer = _in_motion(plan, case, run, method.method, spec, record, place)
         else:
             aid: list[Indexer] = []
             if isinstance(motion, Indexed) and method.method in INDEXER_METHODS:
                 aid, motion = [_indexer(plan, case, run, motion)], motion.motion  # the answer is the body's
-            # Where no faults can be, none are looked for.
-            known: dict[str, Any] = {"sound": True} if _is_sound(case.built) else {}
+            # Where no faults can be, none are looked for; an answer that is held against the truth is the end.
+            known: dict[str, Any] = {"sound": True, "goes_on": False} if _is_sound(case.built) else {}
             limit = plan.heading_limit
             answer = align(record, place, spec, aid=aid, method=method.method, heading_limit=limit, **known)
         errors = [

@@ -15,6 +15,7 @@ from typing import Any
 from truenorth.campaign.plan import Plan, read_plan
 from truenorth.campaign.store import Block, other_versions, versions
 from truenorth.core.errors import UsageError
+from truenorth.core.worker import begin
 
 AHEAD = 2  # blocks under way for each worker: memory stays bounded, and no worker waits
 ATTEMPTS = 3  # for a block whose worker was lost
@@ -23,6 +24,8 @@ ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THRE
 # GNU's C library keeps the memory of a run for the next one, up to so many bytes. It would give large arrays back and take them
 # anew, page by page: a twentieth of the time of a run.
 KEPT = {"MALLOC_TRIM_THRESHOLD_": str(2**28), "MALLOC_MMAP_THRESHOLD_": str(2**25)}
+
+LOADED = ("truenorth.campaign.aligning", "truenorth.campaign.rows")  # what :func:`work` needs
 
 
 def work(plan: dict[str, Any], block: Block) -> Any:
@@ -74,7 +77,7 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
     """
     mapping, left, attempts = plan.to_mapping(), list(blocks), dict.fromkeys(blocks, 0)
     while left:
-        with one_thread_each(), pool_of(workers) as pool:
+        with one_thread_each(), pool_of(workers, *LOADED) as pool:
             under_way: dict[Future[Any], Block] = {}
             try:
                 while left or under_way:
@@ -100,40 +103,16 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
 
 
 @contextmanager
-def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of spawned processes; on the way out, an interrupt does not wait for the blocks under way."""
+def pool_of(workers: int, *modules: str) -> Iterator[ProcessPoolExecutor]:
+    """A pool of spawned processes, which load modules first; an interrupt does not wait for the blocks under way."""
     import multiprocessing
 
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=begin)
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=begin, initargs=modules)
     try:
         yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-def begin() -> None:
-    """What a worker does first."""
-    import atexit
-    import gc
-
-    atexit.register(gc.freeze)  # what is there at the end goes with the process, without being looked through
-    end_with_parent()
-
-
-def end_with_parent() -> None:
-    """End this worker at once where its parent has died, however it died: nobody would take its result."""
-    import multiprocessing
-    import threading
-
-    parent = multiprocessing.parent_process()
-
-    def watch() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager

@@ -119,7 +119,7 @@ def _in_turn(left: Mapping[Pair, Sequence[str]], seed: int, tell: Callable[[str]
 def _by_workers(
     left: Mapping[Pair, Sequence[str]], seed: int, workers: int, tell: Callable[[str], None]
 ) -> Iterator[Trial]:
-    with one_thread_each(), pool_of(max(workers, 1)) as pool:
+    with one_thread_each(), pool_of(max(workers, 1), __name__) as pool:
         with uninterrupted():  # the first task starts the workers
             under_way = {pool.submit(_of_one, name, run, faults, seed): name for (name, run), faults in left.items()}
         for future in as_completed(under_way):

@@ -25,7 +25,7 @@ from typing import Any, get_args
 
 from pydantic import Field, PrivateAttr, field_validator
 
-from truenorth.alignment.azimuth import AZIMUTH_METHODS
+from truenorth.alignment.assumptions import MOVING
 from truenorth.alignment.procedure import Method
 from truenorth.core.errors import DataError, TruenorthError
 from truenorth.core.paths import as_path, is_file
@@ -60,12 +60,12 @@ class MethodPlan(Strict):
     @property
     def moves(self) -> bool:
         """Whether it aligns on the move."""
-        return self.method in ("in_motion", *AZIMUTH_METHODS)
+        return self.method in ("in_motion", *MOVING)
 
     @field_validator("method")
     @classmethod
     def _known(cls, value: str) -> str:
-        own = (*get_args(Method), "in_motion", *AZIMUTH_METHODS)
+        own = (*get_args(Method), "in_motion", *MOVING)
         if value not in own and value not in plugins("truenorth.methods"):
             raise ValueError(f"{value!r}; expected {', '.join(map(repr, (*own, *plugins('truenorth.methods'))))}")
         return value

@@ -23,14 +23,28 @@ COLOUR_RUNS = 5  # fewer blocks than this show nothing of it
 
 
 def white_variance(velocity: Array) -> Array:
-    """Variance (3,) of what is white in a velocity (K, 3): half the variance of its differences.
+    """Variance (m,) of what is white in a velocity (K, m): half the variance of its differences.
 
     A start for the variance of the base's motion that slow errors of the INS do not enter; a bias of 100 ug is a difference of
     a mm/s every second.
     """
-    steps = velocity[1:] - velocity[:-1]
-    steps -= steps.sum(axis=0) / len(steps)
-    return np.maximum(0.5 * ((steps**2).sum(axis=0) / len(steps)), QUIETEST_BASE**2)
+    found = np.empty(velocity.shape[1])
+    _differ(velocity, found)
+    return np.maximum(0.5 * found, QUIETEST_BASE**2)
+
+
+@compiled
+def _differ(velocity: Any, found: Any) -> None:
+    """Variance (m,) of the differences of neighbours of (K, m)."""
+    count = len(velocity) - 1
+    for i in range(len(found)):
+        total = squares = 0.0
+        for k in range(count):
+            total += velocity[k + 1, i] - velocity[k, i]
+        mean = total / count
+        for k in range(count):
+            squares += (velocity[k + 1, i] - velocity[k, i] - mean) ** 2
+        found[i] = squares / count
 
 
 def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, Array]:

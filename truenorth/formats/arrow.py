@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from truenorth.core.arrow import numbers
 from truenorth.records import Record
 
 if TYPE_CHECKING:
@@ -30,23 +31,6 @@ def to_numpy(columns: list[pa.ChunkedArray]) -> Array:
                 values[start:stop, i][[not valid for valid in chunk.is_valid().to_pylist()]] = np.nan
             start = stop
     return values
-
-
-def numbers(column: ArrayLike, kind: pa.DataType) -> pa.Array:
-    """A column of numbers, none of them absent."""
-    import pyarrow as pa
-
-    values = np.ascontiguousarray(column, dtype=kind.to_pandas_dtype())
-    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(values)])
-
-
-def words(column: Sequence[str]) -> pa.StringArray:
-    """A column of words, none of them absent."""
-    import pyarrow as pa
-
-    coded = [word.encode() for word in column]
-    ends = np.cumsum([0, *map(len, coded)], dtype=np.int32)
-    return pa.StringArray.from_buffers(len(coded), pa.py_buffer(ends), pa.py_buffer(b"".join(coded)))
 
 
 def table_of(record: Record) -> pa.Table:

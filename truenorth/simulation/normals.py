@@ -212,7 +212,7 @@ def _size(word: Any) -> Any:
     return np.int64((word >> np.uint64(9)) & np.uint64((1 << 52) - 1))
 
 
-@borrowing
+@borrowing(forceinline=True)
 def _next_word(normals: Normals) -> Any:
     if normals.at[0] == BLOCK:
         _next_block(normals)
@@ -221,13 +221,13 @@ def _next_word(normals: Normals) -> Any:
     return normals.words[place]
 
 
-@borrowing
+@borrowing(forceinline=True)
 def _next_of_one(normals: Normals) -> float:
     """A number evenly from 0 to 1."""
     return np.float64(np.int64(_next_word(normals) >> np.uint64(11))) * TO_ONE
 
 
-@borrowing
+@borrowing(forceinline=True)
 def _the_long_way(normals: Normals) -> Any:
     """Whether the next word, which the quick way refuses, gives a number nevertheless, and which."""
     word = _next_word(normals)
@@ -244,7 +244,7 @@ def _the_long_way(normals: Normals) -> Any:
             return True, -value if (_size(word) >> 8) & 1 else value
 
 
-@compiled
+@borrowing
 def draw(normals: Normals, out: Any) -> None:
     """The next numbers, as many as `out` (N,) holds."""
     words, scale, most, done, total = normals.words, normals.scale, normals.most, 0, len(out)

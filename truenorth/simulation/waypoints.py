@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from xml.etree import ElementTree
 
 from truenorth.core.earth import SEMI_MAJOR
 from truenorth.core.errors import DataError, UsageError
@@ -109,6 +108,8 @@ def _read_csv(path: Path) -> tuple[list[WayPoint], bool]:
 
 
 def _read_gpx(path: Path) -> tuple[list[WayPoint], bool]:
+    from xml.etree import ElementTree
+
     try:
         root = ElementTree.fromstring(path.read_text(encoding="utf-8-sig"))
     except ElementTree.ParseError as error:
