@@ -53,6 +53,7 @@ GYRO_UNITS: dict[Kind, dict[str, float]] = {
     "rates": {"rad/s": 1.0, "deg/s": 1.0, "deg/h": 0.1, "mrad/s": 0.02, "mdps": 0.05},
     "increments": {"rad": 1.0, "deg": 0.3, "arcsec": 0.2, "mrad": 0.02},
 }
+USUAL_WEIGHT = 0.1
 USUAL = {"m/s^2": ("rad/s", 4.0), "g": ("deg/s", 6.0), "mg": ("deg/s", 4.0), "m/s": ("rad", 4.0), "g*s": ("deg", 4.0)}
 CLOCKS = {"s": 1.0, "ms": 1.0, "us": 0.7, "ns": 0.7, "0.1 ms": 0.02}
 RATES = ((20.0, 1000.0, 1.0), (5.0, 4000.0, 0.3), (1.0, 4000.0, 0.05), (0.2, 20000.0, 0.003))  # Hz, weight
@@ -67,6 +68,12 @@ class Reading:
     probability: float
     why: str
     kind: Kind = "rates"
+
+
+def is_usual(sensor: str, unit: str, kind: Kind) -> bool:
+    """Whether many logs are in this unit of the ``gyro`` or the ``accel``; one of the others fits some numbers by chance."""
+    units = GYRO_UNITS if sensor == "gyro" else ACCEL_UNITS
+    return units[kind].get(unit, 0.0) >= USUAL_WEIGHT
 
 
 def size(unit: str) -> float:
@@ -125,6 +132,12 @@ class GyroFacts:
     largest: float
     force_walk: float
 
+    @property
+    def turned(self) -> bool:
+        """Whether the gyros turn gravity as the accelerometers show it, to a factor."""
+        best = self.turning.best_agreement
+        return bool(np.isfinite(best) and best >= AGREES)
+
 
 def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     """What the gyros of a log show in its first `JUDGED` rows; `gyro` and `accel` (N, 3) in any unit, rates or increments."""
@@ -182,7 +195,7 @@ def _random_walk(data: Array, interval: float) -> float:
 
 def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence[str] | None = None) -> list[Reading]:
     """Units of gyros, most likely first."""
-    turned = np.isfinite(facts.turning.best_agreement) and facts.turning.best_agreement >= AGREES
+    turned = facts.turned
     usual, weight = USUAL.get(accel_unit, ("", 1.0))
     readings = []
     for unit, prior in GYRO_UNITS[kind].items() if units is None else dict.fromkeys(units, 1.0).items():

@@ -29,6 +29,7 @@ class Choice:
     sensors: list[tuple[str, float]]  # list of (str, float); six columns, each with its sign
     units: dict[str, str] = field(default_factory=dict)  # that the headings name, of ``gyro``, ``accel`` and ``time``
     documented: bool = False  # the columns have our own names, which mean SI
+    named: bool = True  # names say what the columns are; else their numbers do, which fit a rare unit by chance
     guesses: list[Guess] = field(default_factory=list)
 
     @property

@@ -12,11 +12,15 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.formats.behaviour import (
+    JUDGED,
     SURE_GYRO,
+    GyroFacts,
+    Reading,
     accel_readings,
     gravity_level,
     gyro_facts,
     gyro_readings,
+    is_usual,
 )
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.choice import choose
@@ -138,6 +142,8 @@ def _units(
         kinds: tuple[Kind, ...] = ("rates", "increments") if kind is None else (kind,)
         level = gravity_level(accel)
         readings = accel_readings(level, interval, kinds)
+        if not choice.named:
+            readings = [r for r in readings if is_usual("accel", r.unit, r.kind)] or readings
         if not readings:
             raise DataError(f"{source}: {_no_gravity(level, accel, kinds[0], interval)}")
         options = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
@@ -151,10 +157,31 @@ def _units(
             raise DataError(
                 f"{source}: the gyros' values are those of a gyro in no usual unit; say the unit, or check that these are the gyros"
             )
+        _check_rare(facts, readings, gyro, kind, source, guesses)
         said["gyro"] = take(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
+
+
+def _check_rare(
+    facts: GyroFacts, readings: Sequence[Reading], gyro: Array, kind: Kind, source: str, guesses: list[Guess]
+) -> None:
+    """Ask where gyros look like a unit of few logs and do not turn gravity by it, or hold whole numbers, as counts do.
+
+    A vehicle that turns about the vertical looks like a gyro at rest in such a unit. 16.4 counts for one deg/s, as of a common
+    sensor, are nearly mrad/s.
+    """
+    best = readings[0]
+    whole = bool(np.all(gyro[:JUDGED] == np.round(gyro[:JUDGED])))
+    if is_usual("gyro", best.unit, kind) or (facts.turned and not whole):
+        return
+    usual = ("deg/s", "rad/s") if kind == "rates" else ("rad", "deg")
+    options = [{"units": {"gyro": unit}} for unit in (best.unit, *usual)]
+    raise UnsureError(
+        f"{source}: the gyros look like {best.unit}, which few logs are in, and counts may by chance: {best.why}; if they are "
+        "counts, say how large one is, such as 0.061 deg/s", options, guesses,
+    )  # fmt: skip
 
 
 def _sensor(key: str) -> str:
