@@ -115,3 +115,37 @@ def test_counts_that_are_nearly_mrad_s_are_asked_about(tmp_path):
         read_imu(path)
     assert {"units": {"gyro": "deg/s"}} in said.value.options
     is_read(path, rel=2e-2, units={"gyro": "0.0609756 deg/s"})
+
+
+# ------------------------------------------------------------------------------------------------------------ clocks
+
+
+def test_a_clock_of_hours_minutes_and_seconds(tmp_path):
+    """As VBOX and NMEA write the time: 101200.00 comes 10 ms after 101159.99."""
+    path = tmp_path / "log.csv"
+    seconds = 36719.5 + MOVED.time
+    face = [f"{int(s // 3600):02d}{int(s % 3600 // 60):02d}{s % 60:05.2f}" for s in seconds]
+    assert "101159.99" in face and "101200.00" in face
+    path.write_text("time,wx,wy,wz,ax,ay,az\n" + rows(face, MOVED.gyro, MOVED.accel))
+    record = is_read(path)
+    assert abs(record.time[0] - seconds[0]) < 1e-6
+    is_read(path, rate=100.0)
+
+
+def test_seconds_past_sixty_are_seconds(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,wx,wy,wz,ax,ay,az\n" + rows(101112.0 + MOVED.time, MOVED.gyro, MOVED.accel, form="%.12g"))
+    assert is_read(path).time[-1] == pytest.approx(101152.0)
+
+
+@pytest.mark.parametrize(("count", "rate"), [(1e-6, 60.0), (1e-4, 100.0)], ids=["DOT", "MTi"])
+def test_the_fine_time_of_an_xsens(tmp_path, count, rate):
+    """``SampleTimeFine`` counts 0.1 ms in an MTi and 1 us in a DOT."""
+    moved, path = truth("swaying", "tactical", rate, 40.0), tmp_path / "log.csv"
+    above = "sep=,\nDeviceTag:,DOT1\nOutputRate:,60Hz\nSelective Data Recording\n\n"
+    names = ["PacketCounter", "SampleTimeFine", *(f"Acc_{x}" for x in "XYZ"), *(f"Gyr_{x}" for x in "XYZ")]
+    stamps = [f"{3412345678 + round(t / count)}" for t in moved.time]
+    path.write_text(
+        above + ",".join(names) + "\n" + rows(np.arange(len(stamps)), stamps, moved.accel, moved.gyro / DEG)
+    )
+    is_read(path, moved)

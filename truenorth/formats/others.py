@@ -18,7 +18,7 @@ from truenorth.formats.units import split, unit_in
 Array = NDArray[np.float64]
 
 WORDS = re.compile(
-    r"roll|pitch|yaw|heading|hdg|azi|azimuth|euler|angles?|attitude|orient\w*|ori|quat\w*|q[0-3wxyz]|vector|matrix|rotmat|dcm|"
+    r"roll|pitch|yaw|heading|hdg|azi|azimuth|euler|angles?|attitude|orient\w*|ori|d?quat\w*|d?q[0-3wxyz]?|vector|matrix|rotmat|dcm|"
     r"lat|latitude|lon|long|lng|longitude|alt|altitude|height|hgt|depth|pos|position|dpos|odom\w*|east|north|up|easting|northing|"
     r"ecef|vel|velocity|speed|spd|v[neud]|course|cog|mag|magn|magnet|magnetic|magnetometer|compass|magx|magy|magz|m[xyz]|h[xyz]|"
     r"temp|temperature|pres|press|pressure|baro|humidity|light|proximity|volt|voltage|vdd|batt|battery|current|hdop|vdop|pdop|tdop|"
