@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 INTERVALS = ("ts", "Ts", "dt", "interval")
 FREQUENCIES = ("fs", "Fs", "sampling_rate", "samplingRate", "sample_rate", "sampleRate", "sampling_frequency")
-RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|$)", re.IGNORECASE)
+RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|sps\b|$)", re.IGNORECASE)
 FEWEST = 50  # rows, from which a log shows by itself what its numbers are
 BUNCHED = 1.2  # mean over median step, from which stamps are of a computer that read several rows at once
 BUNCH_SHARE = 0.05  # of the steps that are longer than 1.5 median ones, or zero; gaps are fewer

@@ -71,6 +71,7 @@ def dialect_of(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
     """The dialect of the last lines of the head, and how many cells they have."""
     lines = [line for _, line in head if not is_remark(line)][-SAMPLE:]
     lines = lines[:-1] if len(lines) > 2 else lines  # the last one may be cut
+    tabs = bool(lines) and all("\t" in line.strip() for line in lines)
     best, count, highest = Dialect(",", "."), 0, -1.0
     for decimal in (".", ",", EITHER):
         for delimiter in DELIMITERS:
@@ -81,6 +82,8 @@ def dialect_of(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
             size, rows_of_size = Counter(len(row) for row in rows if row).most_common(1)[0] if any(rows) else (0, 0)
             numbers = [dialect.share(row) for row in rows if len(row) == size]
             alone = 0.5 if size < 2 else 1.0  # a table has several columns
+            if delimiter is None and tabs:
+                alone *= 0.95  # blanks inside cells, such as dates: tabs divide them
             score = alone * rows_of_size / max(1, len(lines)) * (sum(numbers) / max(1, len(numbers)))
             # Of equals the dialect of more columns: a line of one cell is a number in none or in all of them.
             if (score, size) > (highest + 1e-9, 0) or (abs(score - highest) <= 1e-9 and size > count):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,6 +27,7 @@ from truenorth.formats.choice import choose
 from truenorth.formats.chosen import Choice
 from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
+from truenorth.formats.counts import counts_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.records import COLUMNS, Guess, ImuRecord
@@ -58,8 +59,10 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     if columns.notes:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
     gyro, accel = _sensors(columns, layout, choice)
+    said_above = counts_above(columns.above)
+    choice.units = {**choice.units, **said_above}
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
-    kind, units = _units(time, gyro, accel, layout, choice, source, guesses)
+    kind, units = _units(time, gyro, accel, layout, choice, said_above, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
     if layout.axes is None:
         layout = _axes(columns, layout, choice, accel, guesses)
@@ -117,7 +120,14 @@ def _place_in_array(name: str) -> int:
 
 
 def _units(
-    time: Array, gyro: Array, accel: Array, layout: Layout, choice: Choice, source: str, guesses: list[Guess]
+    time: Array,
+    gyro: Array,
+    accel: Array,
+    layout: Layout,
+    choice: Choice,
+    above: Container[str],
+    source: str,
+    guesses: list[Guess],
 ) -> tuple[Kind, dict[str, str]]:
     """Kind of the rows, and the units of the sensors."""
     said = {
@@ -125,7 +135,9 @@ def _units(
     }
     kind: Kind | None = layout.kind or choice.kind
     for key, unit in said.items():
-        who = "as the caller says" if key in layout.units else "the heading"
+        who = (
+            "as the caller says" if key in layout.units else "a line above the table" if key in above else "the heading"
+        )
         guesses.append(Guess(f"unit of the {_sensor(key)}", unit, who, 1.0, {"units": {key: unit}}))
     if kind is None and "accel" in said:
         kind = "increments" if _dimension(said["accel"]) == DIMENSIONS["speed"][0] else "rates"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.behaviour import accel_readings, gravity_level, is_usual
 from truenorth.formats.chosen import MOST_COLUMNS, Choice, with_time
 from truenorth.formats.columns import Columns, listed
@@ -16,7 +17,7 @@ from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
 from truenorth.formats.names import plain
 from truenorth.formats.others import is_other, quaternions
-from truenorth.formats.units import split
+from truenorth.formats.units import split, unit_in
 from truenorth.records import COLUMNS, Guess
 
 Array = NDArray[np.float64]
@@ -87,8 +88,20 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     names = [*others[0], *forces[0]]
     why = f"the norm of columns {' '.join(forces[0])} is gravity's; {' '.join(others[0])} are the three others"
     choice.sensors = [(name, 1.0) for name in names]
+    choice.units = {**choice.units, **_units(names)}
     choice.guesses.append(Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(COLUMNS["rates"], names))}))
     return choice
+
+
+def _units(names: list[str]) -> dict[str, str]:
+    """Units of rates and specific forces that the headings of three columns agree on."""
+    result = {}
+    for sensor, dimension, three in (("gyro", "angular_rate", names[:3]), ("accel", "acceleration", names[3:])):
+        said = {unit_in(split(name)[1] or "") for name in three}
+        unit = said.pop()
+        if not said and unit is not None and parse_unit(unit)[1] == DIMENSIONS[dimension][0]:
+            result[sensor] = unit
+    return result
 
 
 def _blocks(group: list[str]) -> list[list[str]]:
