@@ -255,3 +255,29 @@ def test_the_text_of_an_ardupilot_log(tmp_path):
     assert record.kind == "rates"
     np.testing.assert_allclose(record.gyro, MOVED.gyro[:, [1, 0, 2]] * [1, 1, -1], atol=1e-6)
     np.testing.assert_allclose(record.time, MOVED.time, atol=1e-6)
+
+
+def test_large_forces_are_not_gravity_in_feet(tmp_path):
+    """A rocket that spins: its median force is 3.4 g, gravity in ft/s^2."""
+    path = tmp_path / "log.csv"
+    forces = MOVED.accel * (33.6 / 9.8)
+    path.write_text(names("t", "w{}", "a{}") + rows(MOVED.time, MOVED.gyro, forces))
+    with pytest.raises(UnsureError, match=r"look like ft/s\^2, which few logs are in") as said:
+        read_imu(path)
+    assert {"units": {"accel": "m/s^2"}} in said.value.options
+
+
+# ---------------------------------------------------------------------------------------------------------- repeats
+
+
+def test_rows_written_twice_are_left_out(tmp_path):
+    path = tmp_path / "log.csv"
+    lines = rows(MOVED.time, MOVED.gyro, MOVED.accel).splitlines()
+    twice = [line for k, line in enumerate(lines) for _ in range(2 if k in (0, 700, 2000) else 1)]
+    path.write_text(names("time", "gyro_{}", "accel_{}") + "\n".join(twice) + "\n")
+    record = is_read(path)
+    assert any("left out: 3, the first is line 3" in guess.value for guess in record.taken_for)
+    other = lines[700].rpartition(",")[0] + ",9.5"
+    path.write_text(names("time", "gyro_{}", "accel_{}") + "\n".join([*lines[:701], other, *lines[701:]]) + "\n")
+    with pytest.raises(DataError, match=r"line 703, column time: time repeats|so that some repeat"):
+        read_imu(path)

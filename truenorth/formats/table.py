@@ -30,6 +30,7 @@ from truenorth.formats.columns import Columns
 from truenorth.formats.counts import counts_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
+from truenorth.formats.repeats import without_repeats
 from truenorth.records import COLUMNS, Guess, ImuRecord
 from truenorth.records.imu import Kind
 
@@ -56,9 +57,12 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     source = columns.path.name
     choice = choose(columns, layout)
     guesses = choice.guesses
+    gyro, accel = _sensors(columns, layout, choice)
+    columns, kept = without_repeats(columns, choice, gyro, accel)
+    if kept is not None:
+        gyro, accel = gyro[kept], accel[kept]
     if columns.notes:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
-    gyro, accel = _sensors(columns, layout, choice)
     said_above = counts_above(columns.above)
     choice.units = {**choice.units, **said_above}
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
@@ -158,7 +162,15 @@ def _units(
             readings = [r for r in readings if is_usual("accel", r.unit, r.kind)] or readings
         if not readings:
             raise DataError(f"{source}: {_no_gravity(level, accel, kinds[0], interval)}")
-        options = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
+        options: list[dict[str, Any]] = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
+        best = readings[0]
+        if not is_usual("accel", best.unit, best.kind):
+            usual = ("m/s^2", "g") if best.kind == "rates" else ("m/s",)
+            options = [options[0], *({"units": {"accel": unit}} for unit in usual)]
+            raise UnsureError(
+                f"{source}: the accelerometers look like {best.unit}, which few logs are in, and large forces, a log without "
+                f"gravity or counts may by chance: {best.why}", options, guesses,
+            )  # fmt: skip
         best = take("unit of the accelerometers", readings, options, source, guesses)
         kind, said["accel"] = best.kind, best.unit
     assert kind is not None

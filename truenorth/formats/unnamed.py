@@ -64,14 +64,15 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     alone = [pair for group in groups if (pair := _pair(group, blocks, forces))]
     if len(alone) == 1:  # one variable is an IMU by itself, whatever the others are: attitude, for one
         blocks, forces = alone[0]
+    from truenorth.formats.sensor_folder import hint
+
     if longest >= 3 and forces and len(blocks) < 2:
         raise DataError(
             f"{source}: columns {' '.join(forces[0])} show gravity, and no other three may be gyros among "
             f"{listed(columns.names)}; expected rates about three axes next to specific forces: name the columns of the gyros"
+            + hint(columns.path)
         )
     if longest < 3 or not forces or len(blocks) < 2:
-        from truenorth.formats.sensor_folder import hint
-
         raise DataError(
             f"{source}: no columns of an IMU among {listed(columns.names)}; expected time, gyro_x .. accel_z (rates "
             "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
