@@ -10,7 +10,7 @@ import pytest
 
 from tests.formats.corpus.truth import DEG, truth
 from truenorth.core.errors import DataError
-from truenorth.formats import UnsureError, read_imu
+from truenorth.formats import UnsureError, read_imu, write_layout
 
 G = 9.80665
 MOVED = truth("swaying", "tactical", 100.0, 40.0)
@@ -280,4 +280,56 @@ def test_rows_written_twice_are_left_out(tmp_path):
     other = lines[700].rpartition(",")[0] + ",9.5"
     path.write_text(names("time", "gyro_{}", "accel_{}") + "\n".join([*lines[:701], other, *lines[701:]]) + "\n")
     with pytest.raises(DataError, match=r"line 703, column time: time repeats|so that some repeat"):
+        read_imu(path)
+
+
+# --------------------------------------------------------------------------------------------------------- programs
+
+
+def test_the_signs_of_an_iphone(tmp_path):
+    """Apple's accelerations point down at rest: SensorLog writes them under the names of the framework."""
+    path = tmp_path / "log.csv"
+    header = ["motionTimestamp_sinceReboot(s)", *xyz("accelerometerAcceleration{}(G)", "XYZ")]
+    header += [*xyz("motionRotationRate{}(rad/s)", "XYZ"), *xyz("motionUserAcceleration{}(G)", "XYZ")]
+    path.write_text(",".join(header) + "\n" + rows(MOVED.time, -MOVED.accel / G, MOVED.gyro, 1e-3 * MOVED.accel))
+    record = is_read(path)
+    assert any("iPhone" in guess.why for guess in record.taken_for)
+    write_layout(record, path)
+    is_read(path)
+
+
+def test_decimal_commas_in_quotes(tmp_path):
+    path = tmp_path / "log.csv"
+    lines = rows(MOVED.time, MOVED.gyro, MOVED.accel, form="%.6f", sep=";").splitlines()
+    quoted = [",".join(f'"{cell.replace(".", ",")}"' for cell in line.split(";")) for line in lines]
+    path.write_text(names("time", "w{}", "a{}") + "\n".join(quoted) + "\n")
+    is_read(path)
+    thousands = [",".join(f'"{10 * k:,}"' for k in range(200, 207)) for _ in range(100)]
+    path.write_text(names("time", "w{}", "a{}") + "\n".join(thousands) + "\n")
+    with pytest.raises(DataError):
+        read_imu(path)
+
+
+def test_the_durations_of_a_timetable(tmp_path):
+    """MATLAB writes ``0.01 sec``, and the columns of a variable with numbers."""
+    path = tmp_path / "log.csv"
+    header = ["Time", *(f"AngularVelocity_{k}" for k in (1, 2, 3)), *(f"Acceleration_{k}" for k in (1, 2, 3))]
+    stamps = [f"{t:.2f} sec" for t in MOVED.time]
+    path.write_text(",".join(header) + "\n" + rows(stamps, MOVED.gyro, MOVED.accel))
+    is_read(path)
+
+
+def test_the_stamps_of_a_serial_monitor(tmp_path):
+    """``10:11:12.345 -> `` stands before each line: the first number is not lost with it."""
+    path = tmp_path / "log.txt"
+    lines = rows(MOVED.accel, MOVED.gyro, np.full(len(MOVED.time), 25.0)).splitlines()
+    stamps = [f"10:11:{s:06.3f} -> " for s in 10.0 + MOVED.time]
+    path.write_text("\n".join(stamp + line for stamp, line in zip(stamps, lines)) + "\n")
+    is_read(path)
+
+
+def test_sentences_of_a_receiver_are_no_log_of_an_imu(tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_text("$GPGGA,101112.00,4705.0,N,00805.0,E,4,12,0.8,400,M,47,M,,*5B\r\n" * 60)
+    with pytest.raises(DataError, match=r"sentences of a receiver.*give this one as the receiver's"):
         read_imu(path)

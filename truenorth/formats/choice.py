@@ -23,6 +23,7 @@ from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
+CORE_MOTION = "accelerometer_acceleration"  # as apps write the field of that name, of Apple's framework
 REFERENCE = re.compile(r"([^\[\]]+?)\s*\[\s*(\d+)\s*:\s*(\d+)\s*\]")
 
 
@@ -198,10 +199,17 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         if said is not None and kind == "rates" and parse_unit(said)[1] == DIMENSIONS["speed"][0]:
             kind = "increments"
         ours = COLUMNS[kind]
-        guess = Guess("columns", ", ".join(names), "their names", 1.0, {"columns": dict(zip(ours, names))})
+        down = accels[0]["x"].family == CORE_MOTION
+        signed = [f"-{name}" if down and k > 2 else name for k, name in enumerate(names)]
+        why = "their names" + ("; an iPhone's accelerations point down at rest: their signs are turned" if down else "")
+        guess = Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(ours, signed))})
         shown = kind if kind == "increments" or said is not None or says_rates(names[3:]) else None
         return Choice(
-            shown, (), [(name, 1.0) for name in names], _units(headings, layout.kind or kind), guesses=[guess]
+            shown,
+            (),
+            [(name, -1.0 if down and k > 2 else 1.0) for k, name in enumerate(names)],
+            _units(headings, layout.kind or kind),
+            guesses=[guess],
         )
     return None
 

@@ -23,6 +23,7 @@ STAMP = re.compile(
 )
 DELIMITERS = (",", ";", "\t", "|", None)  # None: blanks
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+", re.ASCII)
+QUOTED = re.compile(r'"\s*([+-]?\d+,\d+)\s*"', re.ASCII)  # a decimal comma between columns that commas divide
 EITHER = ".,"  # decimal points in some columns, commas in others
 SAMPLE = 40  # lines by which the dialect is judged
 
@@ -72,10 +73,11 @@ def dialect_of(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
     lines = [line for _, line in head if not is_remark(line)][-SAMPLE:]
     lines = lines[:-1] if len(lines) > 2 else lines  # the last one may be cut
     tabs = bool(lines) and all("\t" in line.strip() for line in lines)
+    quoted = bool(lines) and all(any(THOUSANDS.fullmatch(c) is None for c in QUOTED.findall(line)) for line in lines)
     best, count, highest = Dialect(",", "."), 0, -1.0
     for decimal in (".", ",", EITHER):
         for delimiter in DELIMITERS:
-            if delimiter == "," and decimal != ".":
+            if delimiter == "," and (decimal == EITHER or (decimal == "," and not quoted)):
                 continue
             dialect = Dialect(delimiter, decimal)
             rows = [dialect.cells(line) for line in lines]

@@ -119,6 +119,8 @@ def clock_of(name: str) -> tuple[bool, str | None]:
     words = BEHIND.sub("", plain(bare))
     if words in TENTH_MS:
         return True, "0.1 ms"
+    if words in ("millis", "micros"):  # of Arduino
+        return True, "ms" if words == "millis" else "us"
     match = CLOCK.fullmatch(words) or CLOCK.fullmatch(BEFORE.sub("", words, count=1))
     if match is None:
         return False, None

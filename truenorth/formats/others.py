@@ -28,6 +28,7 @@ WORDS = re.compile(
 TURN_OR_FORCE = re.compile(
     r"rate|gyr|rot(?!(?:ation)?_?(?:vec|mat|quat))|omega|ang(?:ular)?_?vel|acc(?!ur)|force|inc(?:rement)?s?(?:_|$)|del(?:ta)?_?|_?dv|d?_?theta"
 )
+PART_OF_QUATERNION = re.compile(r"(?:^|_)d?q_?[0-3wxyz]$|quat")
 DIMENSIONS_OF_IMU = ("angular_rate", "angle", "acceleration", "speed")
 UNIT_NORM = 2e-3  # by which the norm of a quaternion differs from one, as logs round it
 PART = (2.0 * UNIT_NORM) ** 0.5  # a rate of this size next to forces of one g has another norm
@@ -40,6 +41,8 @@ def is_other(name: str) -> bool:
     if said is not None and parse_unit(said)[1] not in [DIMENSIONS[kind][0] for kind in DIMENSIONS_OF_IMU]:
         return True
     words = plain(bare)
+    if PART_OF_QUATERNION.search(words):
+        return True
     if TURN_OR_FORCE.search(words):
         return False
     parts = words.split("_")

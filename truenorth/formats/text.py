@@ -32,6 +32,7 @@ LONGEST_LINE = 65536
 MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
+MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
 
@@ -192,7 +193,7 @@ def open_table(path: Path) -> TextTable:
         No line of numbers, lines that fit no dialect, or a header of another number of columns.
     """
     text, note = text_of(path)
-    text = without_outer_quotes(text)
+    text = _with_stamps_apart(without_outer_quotes(text))
     head = _head(path, text)
     if not head:
         raise DataError(f"{path.name}: no header and no numbers; the file holds empty lines only")
@@ -223,6 +224,17 @@ def open_table(path: Path) -> TextTable:
         dialect = replace(dialect, decimal=".")
         notes += ("decimal points in some columns, commas in others",)
     return _without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
+
+
+def _with_stamps_apart(text: bytes) -> bytes:
+    """The text with a separator behind the stamps of a serial monitor, which writes ``10:11:12.345 -> `` before each line."""
+    lines = [line[1] for line in islice(_lines(text), SAMPLE) if line[1].strip()]
+    marked = [line for line in lines if MONITOR.match(line)]
+    if len(marked) < 0.8 * len(lines) or not marked:
+        return text
+    rest = marked[-1][MONITOR.match(marked[-1]).end() :]  # type: ignore[union-attr]
+    mark = next((mark for mark in (b",", b";", b"\t") if mark in rest), b" ")
+    return MONITOR.sub(rb"\1" + mark, text)
 
 
 def _lines(text: bytes) -> Iterator[re.Match[bytes]]:
