@@ -333,3 +333,28 @@ def test_sentences_of_a_receiver_are_no_log_of_an_imu(tmp_path):
     path.write_text("$GPGGA,101112.00,4705.0,N,00805.0,E,4,12,0.8,400,M,47,M,,*5B\r\n" * 60)
     with pytest.raises(DataError, match=r"sentences of a receiver.*give this one as the receiver's"):
         read_imu(path)
+
+
+@pytest.mark.parametrize(
+    ("parts", "velocity"), [("OriInc_q{}", "VelInc_{}"), ("dq_{}", "dv[{}]")], ids=["MT Manager", "DOT"]
+)
+def test_increments_of_attitude_as_quaternions(tmp_path, parts, velocity):
+    """The vector part is half the angle."""
+    path, dot = tmp_path / "log.txt", parts == "dq_{}"
+    moved = truth("swaying", "tactical", 60.0, 40.0) if dot else MOVED
+    angle = moved.increments.gyro
+    size = np.linalg.norm(angle, axis=1)[:, None]
+    quaternion = np.hstack([np.cos(size / 2), angle / size * np.sin(size / 2)])
+    stamps = np.round(moved.time * (1e6 if dot else 1e4))
+    header = ["PacketCounter", "SampleTimeFine", *(parts.format(k) for k in ("WXYZ" if dot else "0123"))]
+    header += [velocity.format(k) for k in ("123" if dot else "XYZ")]
+    table = [np.arange(len(stamps)), stamps, quaternion, moved.increments.accel]
+    path.write_text("\t".join(header) + "\n" + rows(*table, sep="\t", form="%.12g"))
+    record = is_read(path, moved.increments)
+    assert record.kind == "increments"
+    write_layout(record, path)
+    is_read(path, moved.increments)
+    table[2] = quaternion * [1.1, 1, 1, 1]
+    path.write_text("\t".join(header) + "\n" + rows(*table, sep="\t", form="%.12g"))
+    with pytest.raises(DataError, match="expected a quaternion, of norm 1"):
+        read_imu(path)

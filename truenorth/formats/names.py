@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.layout import BLOCKS
@@ -113,6 +113,14 @@ def _stem(words: str) -> tuple[str, str, str, str | None] | None:
     return None
 
 
+def _from_zero(name: str, names: Sequence[str]) -> str:
+    """A column of an array that is counted from 1, counted from 0: ``dv[1]`` where there are ``dv[3]`` and no ``dv[0]``."""
+    match = re.fullmatch(r"(.*?)\[([1-3])\]", name.strip())
+    if match is None or f"{match[1]}[0]" in names or f"{match[1]}[3]" not in names:
+        return name
+    return f"{match[1]}[{int(match[2]) - 1}]"
+
+
 def clock_of(name: str) -> tuple[bool, str | None]:
     """Whether a heading is a clock's, and the unit it names."""
     bare, unit = split(name)
@@ -142,8 +150,9 @@ def families(names: Sequence[str]) -> dict[str, list[dict[str, Heading]]]:
     """By sensor, the sets of three headings, x, y and z, that the log has."""
     sets: dict[tuple[str, str], dict[str, Heading]] = {}
     for name in names:
-        heading = heading_of(name)
+        heading = heading_of(_from_zero(name, names))
         if heading is not None:
+            heading = replace(heading, name=name)
             sets.setdefault((heading.sensor, heading.family), {}).setdefault(heading.axis, heading)
     result: dict[str, list[dict[str, Heading]]] = {sensor: [] for pair in BLOCKS.values() for sensor in pair}
     for (sensor, _), axes in sets.items():

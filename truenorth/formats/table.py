@@ -31,6 +31,7 @@ from truenorth.formats.counts import counts_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.formats.repeats import without_repeats
+from truenorth.formats.turns import with_angles
 from truenorth.records import COLUMNS, Guess, ImuRecord
 from truenorth.records.imu import Kind
 
@@ -54,7 +55,7 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     UsageError
         A unit of another dimension, or neither time nor rate.
     """
-    source = columns.path.name
+    source, columns = columns.path.name, with_angles(columns)
     choice = choose(columns, layout)
     guesses = choice.guesses
     gyro, accel = _sensors(columns, layout, choice)
