@@ -358,3 +358,27 @@ def test_increments_of_attitude_as_quaternions(tmp_path, parts, velocity):
     path.write_text("\t".join(header) + "\n" + rows(*table, sep="\t", form="%.12g"))
     with pytest.raises(DataError, match="expected a quaternion, of norm 1"):
         read_imu(path)
+
+
+@pytest.mark.parametrize("names_", ["rotX,rotY,rotZ", "rotX (deg),rotY (deg),rotZ (deg)", "theta_x,theta_y,theta_z"])
+def test_angles_are_no_rates(tmp_path, names_):
+    """What they change by turns gravity."""
+    path, angles = tmp_path / "log.csv", np.cumsum(MOVED.gyro, axis=0) * 0.01 / DEG
+    path.write_text(f"time,{names_},accX,accY,accZ\n" + rows(MOVED.time, angles, MOVED.accel))
+    words = "no other three may be gyros" if "deg" in names_ else "turn gravity by what they change by, as angles do"
+    with pytest.raises(DataError, match=words):
+        read_imu(path)
+
+
+def test_dates_with_points_have_the_day_first(tmp_path):
+    path = tmp_path / "log.csv"
+    stamps = [f"02.03.2024 10:11:{t:06.3f}" for t in MOVED.time]
+    path.write_text(names("Time", "w{}", "a{}") + rows(stamps, MOVED.gyro, MOVED.accel))
+    assert is_read(path).time[0] == pytest.approx(1709374260.0 + MOVED.time[0])
+
+
+def test_accelerations_without_gravity_are_no_rates(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,acc_x,acc_y,acc_z,lacc_x,lacc_y,lacc_z\n" + rows(MOVED.time, MOVED.accel, MOVED.gyro))
+    with pytest.raises(DataError, match="no other three may be gyros"):
+        read_imu(path)

@@ -42,6 +42,7 @@ LARGEST_RATE = 2000.0 * DEG  # rad/s
 BIAS_RATIOS = np.logspace(0.0, 4.0, 17)  # bias, deg/h, over random walk, deg/sqrt(h), of gyros of all classes
 TYPICAL, TYPICAL_FORCE, WORST_FORCE_WALK = DEG / 60.0 * 0.2, 80e-6 * G, 400e-6 * G  # rad/sqrt(s), m/s/sqrt(s)
 CLASS_DECADES = 0.6
+ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less than in rad or deg
 DECADE = 0.25  # decades by which those limits are soft
 
 # Prior weight of a unit: how often logs are written so.
@@ -157,6 +158,24 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
     mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
     return GyroFacts(turning, mean, wander, walk, largest, force_walk)
+
+
+def are_angles(time: Array, gyro: Array, accel: Array) -> bool:
+    """Whether columns taken for rates are angles: what they change by turns gravity as rates would, and they do not.
+
+    Roll, pitch and yaw of a base that tilts little change as the rates about its axes. Angles that jump at 360 deg are not seen.
+    """
+    time, gyro, accel = time[:JUDGED], gyro[:JUDGED], accel[:JUDGED]
+    interval = float(np.median(np.diff(time)))
+    rows = max(1, round(CELL / interval))
+    cells = len(time) // rows
+    if cells < 3:
+        return False
+    means = np.hstack([gyro, accel])[: cells * rows].reshape(cells, rows, 6).mean(axis=1)
+    change = np.gradient(means[:, :3], rows * interval, axis=0)
+    found = fit_turning(rows * interval, np.ascontiguousarray(np.hstack([change, means[:, 3:]]).T))
+    sizes = [abs(np.log(found.best_scale * unit)) for unit in (1.0, DEG)] if found.best_scale > 0.0 else [np.inf]
+    return bool(found.best_agreement >= AGREES and min(sizes) < ANGLE_SCALE)
 
 
 def _at_rest_part(data: Array, interval: float) -> Array:

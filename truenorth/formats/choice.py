@@ -182,7 +182,9 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         gyros, accels = sets[kind]
         if not gyros or not accels:
             continue
-        gyros = _calibrated(gyros)
+        gyros = _calibrated([axes for axes in gyros if not _of_angles(axes)])
+        if not gyros:
+            continue
         accels = _calibrated(_with_gravity(columns, accels) if len(accels) > 1 else accels)
         if len(gyros) > 1 or len(accels) > 1:
             several = gyros if len(gyros) > 1 else accels
@@ -217,6 +219,13 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
 def _calibrated(sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:
     """Of several sets of one sensor those that the log does not call uncalibrated."""
     return [axes for axes in sets if "uncal" not in axes["x"].family] or sets
+
+
+def _of_angles(axes: dict[str, Heading]) -> bool:
+    """Whether headings such as ``rotX (deg)`` are those of angles; ``gyro_x_deg`` is careless for deg/s."""
+    unit = axes["x"].unit
+    turned = re.search(r"rot|ang", axes["x"].family) is not None and "rate" not in axes["x"].family
+    return turned and axes["x"].sensor == "gyro" and unit is not None and parse_unit(unit)[1] == DIMENSIONS["angle"][0]
 
 
 def _with_gravity(columns: Columns, sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:

@@ -25,6 +25,7 @@ DAY = 86400.0
 OURS = tuple(name for pair in BLOCKS.values() for name in pair)  # arrays of three columns with our names
 
 SECONDS = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)? (?:s|sec|min|hr)", re.IGNORECASE)  # MATLAB's ``0.01 sec``
+DAY_FIRST = re.compile(r"\d{1,2}\.\d{1,2}\.\d{4} ")  # a date with points
 MOST_NAMES, LONGEST_NAME = 40, 60  # of a message
 
 
@@ -100,8 +101,10 @@ class Columns:
 
         plain = pd.Series([cell.strip() for cell in cells])
         try:
-            if "-" in cells[0] or "/" in cells[0]:
-                stamps = pd.to_datetime(plain, format="mixed", utc=True)
+            if "-" in cells[0] or "/" in cells[0] or DAY_FIRST.match(cells[0].strip()):
+                stamps = pd.to_datetime(
+                    plain, format="mixed", utc=True, dayfirst=DAY_FIRST.match(cells[0].strip()) is not None
+                )
                 return np.asarray(stamps.to_numpy("datetime64[ns]").astype(np.int64) * 1e-9, dtype=np.float64), "dates"
             if ":" in cells[0]:
                 time = pd.to_timedelta(plain.where(plain.str.count(":") == 2, "00:" + plain))

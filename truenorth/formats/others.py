@@ -7,6 +7,7 @@ accelerometers look like gyros, a place like a specific force in some unit, thre
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ WORDS = re.compile(
 TURN_OR_FORCE = re.compile(
     r"rate|gyr|rot(?!(?:ation)?_?(?:vec|mat|quat))|omega|ang(?:ular)?_?vel|acc(?!ur)|force|inc(?:rement)?s?(?:_|$)|del(?:ta)?_?|_?dv|d?_?theta"
 )
+FORCE = re.compile(r"acc(?!ur)|force")
 PART_OF_QUATERNION = re.compile(r"(?:^|_)d?q_?[0-3wxyz]$|quat")
 DIMENSIONS_OF_IMU = ("angular_rate", "angle", "acceleration", "speed")
 UNIT_NORM = 2e-3  # by which the norm of a quaternion differs from one, as logs round it
@@ -41,6 +43,12 @@ def is_other(name: str) -> bool:
     if said is not None and parse_unit(said)[1] not in [DIMENSIONS[kind][0] for kind in DIMENSIONS_OF_IMU]:
         return True
     words = plain(bare)
+    if (
+        said is not None
+        and parse_unit(said)[1] == DIMENSIONS["angle"][0]
+        and re.search(r"rot|ang(?!.*(?:vel|rate|inc))", words)
+    ):
+        return True
     if PART_OF_QUATERNION.search(words):
         return True
     if TURN_OR_FORCE.search(words):
@@ -49,6 +57,11 @@ def is_other(name: str) -> bool:
     return any(WORDS.fullmatch(word) or WORDS.fullmatch(word.rstrip("0123456789")) for word in (*parts, words)) or any(
         WORDS.fullmatch(part[:-1]) for part in parts if part[-1:] in ("x", "y", "z") and len(part) > 3
     )
+
+
+def are_forces(names: Sequence[str]) -> bool:
+    """Whether headings say accelerations, which are no rates."""
+    return all(FORCE.search(plain(split(name)[0])) is not None for name in names)
 
 
 def quaternions(numbers: dict[str, Array]) -> set[str]:

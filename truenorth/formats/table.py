@@ -17,6 +17,7 @@ from truenorth.formats.behaviour import (
     GyroFacts,
     Reading,
     accel_readings,
+    are_angles,
     gravity_level,
     gyro_facts,
     gyro_readings,
@@ -177,6 +178,11 @@ def _units(
     assert kind is not None
     if "gyro" not in said:
         facts = gyro_facts(time, gyro, accel, kind)
+        if kind == "rates" and not facts.turned and are_angles(time, gyro, accel):
+            raise DataError(
+                f"{source}: columns {', '.join(choice.labels[1:4])} turn gravity by what they change by, as angles do; expected "
+                "rates: name the columns of the gyros"
+            )
         readings = gyro_readings(facts, kind, said["accel"])
         if not readings:
             raise DataError(

@@ -16,7 +16,7 @@ from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
 from truenorth.formats.names import plain
-from truenorth.formats.others import is_other, quaternions
+from truenorth.formats.others import are_forces, is_other, quaternions
 from truenorth.formats.units import split, unit_in
 from truenorth.records import COLUMNS, Guess
 
@@ -61,6 +61,7 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
             for reading in accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
         )
     ]  # fmt: skip
+    blocks = [block for block in blocks if block in forces or not (columns.named and are_forces(block))]
     alone = [pair for group in groups if (pair := _pair(group, blocks, forces))]
     if len(alone) == 1:  # one variable is an IMU by itself, whatever the others are: attitude, for one
         blocks, forces = alone[0]
