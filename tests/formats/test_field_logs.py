@@ -382,3 +382,20 @@ def test_accelerations_without_gravity_are_no_rates(tmp_path):
     path.write_text("time,acc_x,acc_y,acc_z,lacc_x,lacc_y,lacc_z\n" + rows(MOVED.time, MOVED.accel, MOVED.gyro))
     with pytest.raises(DataError, match="no other three may be gyros"):
         read_imu(path)
+
+
+def test_counts_of_gyros_next_to_forces_in_si(tmp_path):
+    """131 counts for one deg/s are in no unit near."""
+    path = tmp_path / "log.csv"
+    path.write_text(names("t", "w{}", "a{}") + rows(MOVED.time, np.round(MOVED.gyro / DEG * 131), MOVED.accel))
+    with pytest.raises(DataError, match="a gyro in no usual unit"):
+        read_imu(path)
+
+
+def test_the_message_of_ros_2_as_a_line(tmp_path):
+    """Seconds, nanoseconds, frame, quaternion, rates and forces, each followed by a covariance of zeros; no header."""
+    path, zeros = tmp_path / "log.csv", np.zeros((len(MOVED.time), 9))
+    stamps = [1.7e9 + np.floor(MOVED.time), np.round(MOVED.time % 1 * 1e9)]
+    parts = [*stamps, ["imu_link"] * len(zeros), attitude()[1], zeros, MOVED.gyro, zeros, MOVED.accel, zeros]
+    path.write_text(rows(*parts, form="%.10g"))
+    is_read(path, rate=100.0)

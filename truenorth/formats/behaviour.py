@@ -42,6 +42,7 @@ LARGEST_RATE = 2000.0 * DEG  # rad/s
 BIAS_RATIOS = np.logspace(0.0, 4.0, 17)  # bias, deg/h, over random walk, deg/sqrt(h), of gyros of all classes
 TYPICAL, TYPICAL_FORCE, WORST_FORCE_WALK = DEG / 60.0 * 0.2, 80e-6 * G, 400e-6 * G  # rad/sqrt(s), m/s/sqrt(s)
 CLASS_DECADES = 0.6
+NO_UNIT = 1.1  # of the logarithm, by which the unit that fits best turns gravity too far or not enough: counts, for one
 ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less than in rad or deg
 DECADE = 0.25  # decades by which those limits are soft
 
@@ -214,10 +215,13 @@ def _random_walk(data: Array, interval: float) -> float:
 
 def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence[str] | None = None) -> list[Reading]:
     """Units of gyros, most likely first."""
+    priors = GYRO_UNITS[kind] if units is None else dict.fromkeys(units, 1.0)
     turned = facts.turned
+    if turned and min(abs(np.log(facts.turning.best_scale * size(unit))) for unit in priors) > NO_UNIT:
+        return []
     usual, weight = USUAL.get(accel_unit, ("", 1.0))
     readings = []
-    for unit, prior in GYRO_UNITS[kind].items() if units is None else dict.fromkeys(units, 1.0).items():
+    for unit, prior in priors.items():
         factor = size(unit)
         likely = prior * (weight if unit == usual else 1.0) * _below(facts.largest * factor, LARGEST_RATE)
         if turned:

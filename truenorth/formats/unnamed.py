@@ -48,7 +48,9 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
         free = [name for name in free if not is_other(name)]
     turned = quaternions({name: numbers[name] for name in free})
     free = [name for name in free if name not in turned]
-    groups = [list(names) for _, names in groupby(free, _variable)]
+    free = [name for name in free if np.ptp(numbers[name]) > 0.0]  # what never changes, as a covariance, is no sensor
+    at = {name: 0 if columns.named else columns.names.index(name) - k for k, name in enumerate(free)}
+    groups = [list(names) for _, names in groupby(free, lambda name: (_variable(name), at[name]))]
     blocks = [block for group in groups for block in _blocks(group)]
     clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
     interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
