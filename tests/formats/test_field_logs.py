@@ -399,3 +399,13 @@ def test_the_message_of_ros_2_as_a_line(tmp_path):
     parts = [*stamps, ["imu_link"] * len(zeros), attitude()[1], zeros, MOVED.gyro, zeros, MOVED.accel, zeros]
     path.write_text(rows(*parts, form="%.10g"))
     is_read(path, rate=100.0)
+
+
+@pytest.mark.parametrize(
+    ("header", "size"), [("Unix Time,Microseconds", 1e-6), ("tv_sec,tv_usec", 1e-6), ("seconds,milliseconds", 1e-3)]
+)
+def test_seconds_and_their_parts_in_two_columns(tmp_path, header, size):
+    path = tmp_path / "log.csv"
+    stamps = [1.7e9 + np.floor(MOVED.time + 1e-9), np.round((MOVED.time + 1e-9) % 1 / size)]
+    path.write_text(names(header, "w{}", "a{}") + rows(*stamps, MOVED.gyro, MOVED.accel, form="%.10g"))
+    assert is_read(path).time[0] == pytest.approx(1.7e9 + MOVED.time[0], abs=1e-5)

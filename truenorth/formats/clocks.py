@@ -40,7 +40,7 @@ def clock_of_log(
         return _made(columns, layout, rows, guesses), layout
     raw, said = columns.clock(choice.time[0])
     if len(choice.time) == 2:
-        raw = raw + 1e-9 * columns.read([choice.time[1]], False)[:, 0]
+        raw = raw + choice.fraction * columns.read([choice.time[1]], False)[:, 0]
     if len(raw) != rows:
         raise DataError(f"{source}: gyro and accelerometer have {rows} rows, time {len(raw)}; expected as many of each")
     check_finite(raw[:, None], choice.labels[:1], source, columns.place)
