@@ -97,7 +97,11 @@ BAD = {
     "NaN": (lambda x: _with_cell(x, 7, 1, "nan"), 3, ["line 7", "dtheta_x", "nan"]),
     "inf": (lambda x: _with_cell(x, 7, 5, "-inf"), 3, ["line 7", "dvel_y", "inf"]),
     "time going back": (lambda x: _with_cell(x, 100, 0, "1.0"), 3, ["line 100", "time", "goes back"]),
-    "time that repeats": (lambda x: [*x[:50], x[49], *x[50:]], 3, ["line 51", "time", "repeats"]),
+    "time that repeats": (
+        lambda x: _with_cell([*x[:50], x[49], *x[50:]], 51, 1, "2e-5"),
+        3,
+        ["line 51", "time", "repeats"],
+    ),
     "a gap": (lambda x: x[:500] + x[600:], 3, ["gap of 5.050 s", "row 500", "--from"]),
     "a short line": (lambda x: [*x[:20], "1,2", *x[20:]], 3, ["line 21", "2 columns"]),
     "3 rows": (lambda x: x[:4], 4, ["3 samples", "record longer"]),

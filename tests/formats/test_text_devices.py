@@ -285,7 +285,7 @@ def test_stamps_of_few_digits_ask_for_the_rate(tmp_path):
     assert read_imu(path, units={"gyro": "rad/s"}, rate=120.0).interval == pytest.approx(1 / 120.0)
     write(
         [f"{t:.3f}" for t in np.insert(time, 500, time[500])],
-        np.insert(noise, 500, noise[500], axis=0),
+        np.insert(noise, 500, 2.0 * noise[500], axis=0),
     )
     with pytest.raises(DataError, match="drop the repeated rows"):
         read_imu(path, units={"gyro": "rad/s"})

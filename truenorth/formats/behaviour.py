@@ -42,6 +42,8 @@ LARGEST_RATE = 2000.0 * DEG  # rad/s
 BIAS_RATIOS = np.logspace(0.0, 4.0, 17)  # bias, deg/h, over random walk, deg/sqrt(h), of gyros of all classes
 TYPICAL, TYPICAL_FORCE, WORST_FORCE_WALK = DEG / 60.0 * 0.2, 80e-6 * G, 400e-6 * G  # rad/sqrt(s), m/s/sqrt(s)
 CLASS_DECADES = 0.6
+NO_UNIT = 1.1  # of the logarithm, by which the unit that fits best turns gravity too far or not enough: counts, for one
+ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less than in rad or deg
 DECADE = 0.25  # decades by which those limits are soft
 
 # Prior weight of a unit: how often logs are written so.
@@ -53,6 +55,7 @@ GYRO_UNITS: dict[Kind, dict[str, float]] = {
     "rates": {"rad/s": 1.0, "deg/s": 1.0, "deg/h": 0.1, "mrad/s": 0.02, "mdps": 0.05},
     "increments": {"rad": 1.0, "deg": 0.3, "arcsec": 0.2, "mrad": 0.02},
 }
+USUAL_WEIGHT = 0.1
 USUAL = {"m/s^2": ("rad/s", 4.0), "g": ("deg/s", 6.0), "mg": ("deg/s", 4.0), "m/s": ("rad", 4.0), "g*s": ("deg", 4.0)}
 CLOCKS = {"s": 1.0, "ms": 1.0, "us": 0.7, "ns": 0.7, "0.1 ms": 0.02}
 RATES = ((20.0, 1000.0, 1.0), (5.0, 4000.0, 0.3), (1.0, 4000.0, 0.05), (0.2, 20000.0, 0.003))  # Hz, weight
@@ -67,6 +70,12 @@ class Reading:
     probability: float
     why: str
     kind: Kind = "rates"
+
+
+def is_usual(sensor: str, unit: str, kind: Kind) -> bool:
+    """Whether many logs are in this unit of the ``gyro`` or the ``accel``; one of the others fits some numbers by chance."""
+    units = GYRO_UNITS if sensor == "gyro" else ACCEL_UNITS
+    return units[kind].get(unit, 0.0) >= USUAL_WEIGHT
 
 
 def size(unit: str) -> float:
@@ -125,6 +134,12 @@ class GyroFacts:
     largest: float
     force_walk: float
 
+    @property
+    def turned(self) -> bool:
+        """Whether the gyros turn gravity as the accelerometers show it, to a factor."""
+        best = self.turning.best_agreement
+        return bool(np.isfinite(best) and best >= AGREES)
+
 
 def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     """What the gyros of a log show in its first `JUDGED` rows; `gyro` and `accel` (N, 3) in any unit, rates or increments."""
@@ -144,6 +159,24 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
     mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
     return GyroFacts(turning, mean, wander, walk, largest, force_walk)
+
+
+def are_angles(time: Array, gyro: Array, accel: Array) -> bool:
+    """Whether columns taken for rates are angles: what they change by turns gravity as rates would, and they do not.
+
+    Roll, pitch and yaw of a base that tilts little change as the rates about its axes. Angles that jump at 360 deg are not seen.
+    """
+    time, gyro, accel = time[:JUDGED], gyro[:JUDGED], accel[:JUDGED]
+    interval = float(np.median(np.diff(time)))
+    rows = max(1, round(CELL / interval))
+    cells = len(time) // rows
+    if cells < 3:
+        return False
+    means = np.hstack([gyro, accel])[: cells * rows].reshape(cells, rows, 6).mean(axis=1)
+    change = np.gradient(means[:, :3], rows * interval, axis=0)
+    found = fit_turning(rows * interval, np.ascontiguousarray(np.hstack([change, means[:, 3:]]).T))
+    sizes = [abs(np.log(found.best_scale * unit)) for unit in (1.0, DEG)] if found.best_scale > 0.0 else [np.inf]
+    return bool(found.best_agreement >= AGREES and min(sizes) < ANGLE_SCALE)
 
 
 def _at_rest_part(data: Array, interval: float) -> Array:
@@ -182,10 +215,13 @@ def _random_walk(data: Array, interval: float) -> float:
 
 def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence[str] | None = None) -> list[Reading]:
     """Units of gyros, most likely first."""
-    turned = np.isfinite(facts.turning.best_agreement) and facts.turning.best_agreement >= AGREES
+    priors = GYRO_UNITS[kind] if units is None else dict.fromkeys(units, 1.0)
+    turned = facts.turned
+    if turned and min(abs(np.log(facts.turning.best_scale * size(unit))) for unit in priors) > NO_UNIT:
+        return []
     usual, weight = USUAL.get(accel_unit, ("", 1.0))
     readings = []
-    for unit, prior in GYRO_UNITS[kind].items() if units is None else dict.fromkeys(units, 1.0).items():
+    for unit, prior in priors.items():
         factor = size(unit)
         likely = prior * (weight if unit == usual else 1.0) * _below(facts.largest * factor, LARGEST_RATE)
         if turned:

@@ -23,6 +23,7 @@ from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
+CORE_MOTION = "accelerometer_acceleration"  # as apps write the field of that name, of Apple's framework
 REFERENCE = re.compile(r"([^\[\]]+?)\s*\[\s*(\d+)\s*:\s*(\d+)\s*\]")
 
 
@@ -181,7 +182,9 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         gyros, accels = sets[kind]
         if not gyros or not accels:
             continue
-        gyros = _calibrated(gyros)
+        gyros = _calibrated([axes for axes in gyros if not _of_angles(axes)])
+        if not gyros:
+            continue
         accels = _calibrated(_with_gravity(columns, accels) if len(accels) > 1 else accels)
         if len(gyros) > 1 or len(accels) > 1:
             several = gyros if len(gyros) > 1 else accels
@@ -198,10 +201,17 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         if said is not None and kind == "rates" and parse_unit(said)[1] == DIMENSIONS["speed"][0]:
             kind = "increments"
         ours = COLUMNS[kind]
-        guess = Guess("columns", ", ".join(names), "their names", 1.0, {"columns": dict(zip(ours, names))})
+        down = accels[0]["x"].family == CORE_MOTION
+        signed = [f"-{name}" if down and k > 2 else name for k, name in enumerate(names)]
+        why = "their names" + ("; an iPhone's accelerations point down at rest: their signs are turned" if down else "")
+        guess = Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(ours, signed))})
         shown = kind if kind == "increments" or said is not None or says_rates(names[3:]) else None
         return Choice(
-            shown, (), [(name, 1.0) for name in names], _units(headings, layout.kind or kind), guesses=[guess]
+            shown,
+            (),
+            [(name, -1.0 if down and k > 2 else 1.0) for k, name in enumerate(names)],
+            _units(headings, layout.kind or kind),
+            guesses=[guess],
         )
     return None
 
@@ -209,6 +219,13 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
 def _calibrated(sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:
     """Of several sets of one sensor those that the log does not call uncalibrated."""
     return [axes for axes in sets if "uncal" not in axes["x"].family] or sets
+
+
+def _of_angles(axes: dict[str, Heading]) -> bool:
+    """Whether headings such as ``rotX (deg)`` are those of angles; ``gyro_x_deg`` is careless for deg/s."""
+    unit = axes["x"].unit
+    turned = re.search(r"rot|ang", axes["x"].family) is not None and "rate" not in axes["x"].family
+    return turned and axes["x"].sensor == "gyro" and unit is not None and parse_unit(unit)[1] == DIMENSIONS["angle"][0]
 
 
 def _with_gravity(columns: Columns, sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:

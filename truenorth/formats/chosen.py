@@ -17,6 +17,11 @@ from truenorth.records import Guess
 from truenorth.records.imu import Kind
 
 STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
+SECONDS = re.compile(r"(?i)(?:^|[^a-z])(?:secs?|seconds|unix[ _]?time(?:stamp)?)$")
+FRACTIONS = {
+    1e-3: re.compile(r"(?i)(?:^|[^a-z])(?:milli_?seconds?|millis|msecs?)$"),
+    1e-6: re.compile(r"(?i)(?:^|[^a-z])(?:micro_?seconds?|micros|usecs?)$"),
+}
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
 
@@ -29,7 +34,9 @@ class Choice:
     sensors: list[tuple[str, float]]  # list of (str, float); six columns, each with its sign
     units: dict[str, str] = field(default_factory=dict)  # that the headings name, of ``gyro``, ``accel`` and ``time``
     documented: bool = False  # the columns have our own names, which mean SI
+    named: bool = True  # names say what the columns are; else their numbers do, which fit a rare unit by chance
     guesses: list[Guess] = field(default_factory=list)
+    fraction: float = 1e-9  # s, that the second column of the time counts
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -64,6 +71,8 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
         choice.units["time"] = "s"
         choice.guesses.append(Guess("time", f"{whole[0]} + {parts[0]}", "seconds and nanoseconds by their names"))
         return choice
+    if columns.named and _of_two_columns(columns, names, choice):
+        return choice
     steady = {name: scatter for name in clocks if (scatter := _scatter(columns, name)) is not None}
     if steady:
         best = min(
@@ -87,6 +96,28 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     if layout.rate is None:
         _clock_by_behaviour(columns, layout, choice, names)
     return choice
+
+
+def _of_two_columns(columns: Columns, names: Sequence[str], choice: Choice) -> bool:
+    """Take whole seconds and their milliseconds or microseconds for the clock, where they increase as one."""
+    seconds = [name for name in names if SECONDS.search(name)]
+    for size, pattern in FRACTIONS.items():
+        for part in [name for name in names if pattern.search(name)] if len(seconds) == 1 else []:
+            try:
+                whole, parts = columns.read([seconds[0], part], False).T
+            except DataError:
+                continue
+            counts = bool(np.all((parts >= 0.0) & (parts * size < 1.0)) and np.all(whole == np.round(whole)))
+            if (
+                counts
+                and len(whole) > 1
+                and np.all(np.diff(whole + size * parts) >= 0.0)
+                and np.any(np.diff(parts) < 0.0)
+            ):
+                choice.time, choice.fraction, choice.units["time"] = (seconds[0], part), size, "s"
+                choice.guesses.append(Guess("time", f"{seconds[0]} + {part}", "seconds and their parts by their names"))
+                return True
+    return False
 
 
 def _note_unit(choice: Choice, is_clock: bool, unit: str | None) -> None:

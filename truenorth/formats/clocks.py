@@ -14,7 +14,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.formats.behaviour import clock_readings, size
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.chosen import Choice
-from truenorth.formats.columns import Columns, missing_column
+from truenorth.formats.columns import DAY, Columns, missing_column
 from truenorth.formats.guesses import UnsureError, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.records import Guess
@@ -23,10 +23,11 @@ Array = NDArray[np.float64]
 
 INTERVALS = ("ts", "Ts", "dt", "interval")
 FREQUENCIES = ("fs", "Fs", "sampling_rate", "samplingRate", "sample_rate", "sampleRate", "sampling_frequency")
-RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|$)", re.IGNORECASE)
+RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|sps\b|$)", re.IGNORECASE)
 FEWEST = 50  # rows, from which a log shows by itself what its numbers are
 BUNCHED = 1.2  # mean over median step, from which stamps are of a computer that read several rows at once
 BUNCH_SHARE = 0.05  # of the steps that are longer than 1.5 median ones, or zero; gaps are fewer
+TENTH_MS = "0.1 ms"
 SPAN = 0.02  # by which the stamps' span and that of a given rate may differ
 
 
@@ -39,18 +40,27 @@ def clock_of_log(
         return _made(columns, layout, rows, guesses), layout
     raw, said = columns.clock(choice.time[0])
     if len(choice.time) == 2:
-        raw = raw + 1e-9 * columns.read([choice.time[1]], False)[:, 0]
+        raw = raw + choice.fraction * columns.read([choice.time[1]], False)[:, 0]
     if len(raw) != rows:
         raise DataError(f"{source}: gyro and accelerometer have {rows} rows, time {len(raw)}; expected as many of each")
     check_finite(raw[:, None], choice.labels[:1], source, columns.place)
     stated = layout.units.get("time", choice.units.get("time"))
+    why = "the cells are no bare numbers"
+    if said is None and "time" not in layout.units and is_clock_face(raw):
+        raw, said, why = (
+            of_clock_face(raw),
+            "times of day",
+            "written HHMMSS: no second reaches 60, each minute begins with a jump of 40",
+        )
+    if stated == TENTH_MS and "time" not in layout.units and len(raw) > 2:
+        stated = _fine(raw, source)
     if layout.rate is None:
         _check_bunches(raw, said, stated, source, guesses)
     elif np.all(np.diff(raw) >= 0.0) and raw[-1] > raw[0]:
         return _evenly(raw, said, stated, layout.rate, source, guesses), layout
     check_order(raw, choice.labels[0], source, columns.place)
     if said is not None:
-        guesses.append(Guess("time", said, "the cells are no bare numbers"))
+        guesses.append(Guess("time", said, why))
         return raw, layout
     if "time" in layout.units:
         guesses.append(Guess("unit of time", layout.units["time"], "as the caller says", 1.0, {"units": layout.units}))
@@ -59,6 +69,31 @@ def clock_of_log(
         guesses.append(Guess("unit of time", stated, "the heading", 1.0, {"units": {"time": stated}}))
         return times(raw, size(stated)), layout
     return times(raw, size(_unit_of_time(raw, source, guesses))), layout
+
+
+def is_clock_face(raw: Array) -> bool:
+    """Whether numbers are hours, minutes and seconds as ``101259.98``: no second reaches 60, and each minute begins with a jump."""
+    if len(raw) < FEWEST or not np.all((raw >= 0.0) & (raw < 240000.0)) or not np.all(raw % 100.0 < 60.0):
+        return False
+    steps, minutes = np.diff(raw), np.diff(raw // 100.0)
+    step = float(np.median(steps[minutes == 0.0])) if np.any(minutes == 0.0) else 0.0
+    jumps = steps[(minutes == 1.0) & (raw[1:] % 100.0 < 2.0) & (raw[:-1] % 100.0 > 58.0)]
+    whole = np.any(minutes > 0.0) and np.all(raw % 10000.0 < 6000.0)
+    return bool(
+        whole and 0.0 < step <= 1.0 and jumps.size and np.all(np.abs(jumps - 40.0 - step) < max(0.5 * step, 1e-3))
+    )
+
+
+def of_clock_face(raw: Array) -> Array:
+    """Seconds of the day of numbers such as ``101259.98``; they go on after midnight."""
+    time = raw // 10000.0 * 3600.0 + raw // 100.0 % 100.0 * 60.0 + raw % 100.0
+    return np.asarray(time + DAY * np.concatenate([[0.0], np.cumsum(np.diff(time) < -DAY / 2)]))
+
+
+def _fine(raw: Array, source: str) -> str:
+    """What a count of an Xsens's ``SampleTimeFine`` is: 0.1 ms of an MTi, 1 us of a DOT."""
+    readings = clock_readings(float(np.median(np.diff(raw))), float(raw[0]), (TENTH_MS, "us"))
+    return take("unit of time", readings, [{"units": {"time": r.unit}} for r in readings], source, []).unit
 
 
 def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:

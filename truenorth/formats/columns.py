@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.core.units import parse_unit
 from truenorth.formats.arrow import to_numpy
 from truenorth.formats.layout import BLOCKS
 
@@ -22,6 +24,8 @@ Array = NDArray[np.float64]
 DAY = 86400.0
 OURS = tuple(name for pair in BLOCKS.values() for name in pair)  # arrays of three columns with our names
 
+SECONDS = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)? (?:s|sec|min|hr)", re.IGNORECASE)  # MATLAB's ``0.01 sec``
+DAY_FIRST = re.compile(r"\d{1,2}\.\d{1,2}\.\d{4} ")  # a date with points
 MOST_NAMES, LONGEST_NAME = 40, 60  # of a message
 
 
@@ -97,14 +101,19 @@ class Columns:
 
         plain = pd.Series([cell.strip() for cell in cells])
         try:
-            if "-" in cells[0] or "/" in cells[0]:
-                stamps = pd.to_datetime(plain, format="mixed", utc=True)
+            if "-" in cells[0] or "/" in cells[0] or DAY_FIRST.match(cells[0].strip()):
+                stamps = pd.to_datetime(
+                    plain, format="mixed", utc=True, dayfirst=DAY_FIRST.match(cells[0].strip()) is not None
+                )
                 return np.asarray(stamps.to_numpy("datetime64[ns]").astype(np.int64) * 1e-9, dtype=np.float64), "dates"
             if ":" in cells[0]:
                 time = pd.to_timedelta(plain.where(plain.str.count(":") == 2, "00:" + plain))
                 return _unwrapped(
                     np.asarray(time.to_numpy("timedelta64[ns]").astype(np.int64) * 1e-9, dtype=np.float64)
                 ), "times of day"
+            if all(SECONDS.fullmatch(cell) for cell in plain):
+                parts = [cell.split() for cell in plain]
+                return np.array([float(number) * parse_unit(unit)[0] for number, unit in parts]), "durations"
         except (ValueError, OverflowError) as error:
             raise DataError(
                 f"{self.path.name}: column {name}: not dates or times of one form ({error}); write ISO dates or seconds"

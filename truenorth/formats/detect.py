@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -54,6 +55,7 @@ FOREIGN = {
     b"\xfd7zXZ": "xz data; unpack it",
     b"%PDF": "a PDF document",
 }
+SENTENCE = re.compile(rb"\s*\$(?:G[ABLNPQ]|BD)[A-Z]{3},")  # of a receiver
 TEXT = ("csv", "psins", "kf-gins")
 ANYWHERE = ("novatel", "ubx", "sbf", "vectornav", "gnsslogger")  # whose messages may follow something else
 
@@ -112,6 +114,17 @@ def format_of(
         found, foreign = (
             None,
             "a zip archive without one log in it (of an Excel workbook save the sheet as CSV); unpack it",
+        )
+    if (
+        suffixes is SUFFIXES
+        and given is None
+        and SENTENCE.match(head)
+        and chosen in (None, "csv")
+        and b"$VN" not in head
+    ):
+        raise DataError(
+            f"{path.name}: holds sentences of a receiver (NMEA 0183); expected {what}: name the IMU's log, and give this one as "
+            "the receiver's"
         )
     if foreign is not None and not (chosen == "kf-gins-binary" and len(head) % 56 == 0):
         raise DataError(f"{path.name}: holds {foreign}")

@@ -23,6 +23,7 @@ STAMP = re.compile(
 )
 DELIMITERS = (",", ";", "\t", "|", None)  # None: blanks
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+", re.ASCII)
+QUOTED = re.compile(r'"\s*([+-]?\d+,\d+)\s*"', re.ASCII)  # a decimal comma between columns that commas divide
 EITHER = ".,"  # decimal points in some columns, commas in others
 SAMPLE = 40  # lines by which the dialect is judged
 
@@ -71,16 +72,20 @@ def dialect_of(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
     """The dialect of the last lines of the head, and how many cells they have."""
     lines = [line for _, line in head if not is_remark(line)][-SAMPLE:]
     lines = lines[:-1] if len(lines) > 2 else lines  # the last one may be cut
+    tabs = bool(lines) and all("\t" in line.strip() for line in lines)
+    quoted = bool(lines) and all(any(THOUSANDS.fullmatch(c) is None for c in QUOTED.findall(line)) for line in lines)
     best, count, highest = Dialect(",", "."), 0, -1.0
     for decimal in (".", ",", EITHER):
         for delimiter in DELIMITERS:
-            if delimiter == "," and decimal != ".":
+            if delimiter == "," and (decimal == EITHER or (decimal == "," and not quoted)):
                 continue
             dialect = Dialect(delimiter, decimal)
             rows = [dialect.cells(line) for line in lines]
             size, rows_of_size = Counter(len(row) for row in rows if row).most_common(1)[0] if any(rows) else (0, 0)
             numbers = [dialect.share(row) for row in rows if len(row) == size]
             alone = 0.5 if size < 2 else 1.0  # a table has several columns
+            if delimiter is None and tabs:
+                alone *= 0.95  # blanks inside cells, such as dates: tabs divide them
             score = alone * rows_of_size / max(1, len(lines)) * (sum(numbers) / max(1, len(numbers)))
             # Of equals the dialect of more columns: a line of one cell is a number in none or in all of them.
             if (score, size) > (highest + 1e-9, 0) or (abs(score - highest) <= 1e-9 and size > count):

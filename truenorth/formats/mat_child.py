@@ -28,7 +28,8 @@ def main() -> int:
     except NotImplementedError:
         return TOO_NEW
     except Exception as error:  # whatever a damaged file provokes
-        print(error, file=sys.stderr)
+        opaque = "'NoneType' object is not iterable" in str(error)  # SciPy's, of a shape that an object does not have
+        print("or it holds an object, such as a port: save the arrays alone" if opaque else error, file=sys.stderr)
         return 1
     arrays = _flat({name: value for name, value in content.items() if not name.startswith("__")})
     file = io.BytesIO()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.layout import BLOCKS
@@ -19,16 +19,17 @@ STEMS = {
     "dvel": r"d(?:elta)?_?v(?:el(?:ocity)?)?|(?:v|vel|velocity|acc|accel)_?inc(?:rement)?s?",
     "gyro": r"gyro(?:scope|s|_?rotation|_?rate)?|gyrs?|(?:body_?|turn_?)?rates?|ang(?:ular)?_?(?:vel(?:ocity)?|rate)|omega|ω|"
     r"w(?:_?rs_?s|_?ib_?b|_?ib|_?b|m)?|g|(?:motion_?)?rot(?:ation)?(?:_?rate)?",
-    "accel": r"(?:accelerometer_?)?acc(?:el(?:eration|erometer|erometers|s)?)?s?|lin(?:ear)?_?acc(?:el(?:eration)?)?|"
+    "accel": r"(?:accelerometer_?)?acc(?:e|l|el(?:eration|erometer|erometers|s)?)?s?|lin(?:ear)?_?acc(?:el(?:eration)?)?|"
     r"spec(?:ific)?_?force|sf|f(?:_?ib_?b|_?ib|_?b|m)?|a(?:_?rs_?s|_?ib_?b|_?ib|_?b|m)?|g_?f",
 }
 BEFORE = re.compile(
-    r"(?:(?:imu|ins|field|sensors?|raw|calib(?:rated)?|cal|uncal(?:ibrated)?|body|data|device|meas(?:ured)?|output|inertial|combined|b|mems|fog|rlg|left|right|main|primary)_?\d*_?)+"
+    r"(?:(?:imu|ins|field|sensors?|raw|calib(?:rated)?|cal|uncal(?:ibrated)?|body|data|device|meas(?:ured)?|output|inertial|combined|b|mems|fog|rlg|left|right|main|primary|scaled|shimmer(?:_(?=\w*\d)[0-9a-f]{1,4}(?=_)(?:_(?!acc)[a-f]{1,3}(?=_))?)?|\d+)_?\d*_?)+"
 )
 CHIPS = (  # as Android names its sensors: ``accelerometer_lsm6ds3_c``
     r"(?:lsm|lis|ism|bm[aigx]|ic[mg]|iim|mpu|adxl|adis|mma|kx|l3g|itg|fx[ao]s|stk|ak[mg]?)_?\d\w*"
 )
-AFTER = rf"raw|cal|calibrated|body|b|meas|out|sensor|imu\d*|{CHIPS}"
+AFTER = rf"raw|cal|calibrated|body|b|meas|out|sensor|imu\d*|adc|smooth|ln|wr|{CHIPS}"
+BEHIND = re.compile(r"_(?:raw|cal|uncal|out)$")  # the axis: ``Gyro_X_CAL``, ``XGYRO_OUT``
 RATES = re.compile(
     r"acceleration|angular_?(?:vel(?:ocity)?|rate)|rotation_rate|turn_rate"
 )  # names of nothing but rates
@@ -37,9 +38,9 @@ AXES = {"x": "x", "y": "y", "z": "z"}
 ROLL_RATES = {"p": "x", "q": "y", "r": "z"}  # of aircraft
 CLOCK = re.compile(
     r"(?:(?:imu|gps|gnss|utc|unix|epoch|posix|ros|logging|location|system|sys|sample|device|sensor|host|pc|log|rec|header|field|elapsed|mono|"
-    r"monotonic|recv|receive|start|loggingtime|locationtime|of|since|relative|boot|itow|sow|seconds|motion|accelerometer|gyro)_?)*"
+    r"monotonic|recv|receive|start|loggingtime|locationtime|of|since|relative|boot|offset|itow|sow|seconds|motion|accelerometer|gyro)_?)*"
     r"(?:time(?:_?stamp|_?of_?week|_?of_?day|_?boot|_?fine)?|t|stamp|timestamp|ts|tow|itow|sow|clock|epoch|seconds?|secs?|"
-    r"sampletimefine|datetime|date_?time|utc|elapsed|seconds_elapsed)"
+    r"sampletimefine|datetime|date_?time|utc|elapsed|seconds_elapsed|timestamp_unix)"
     r"(?:_(?P<unit>s|ms|us|ns|secs?|msecs?|usecs?|nsecs?|seconds?|millis(?:econds)?|micros(?:econds)?|nanos(?:econds)?|since_?1970|since_?reboot))?"
 )
 TENTH_MS = ("sampletimefine", "sample_time_fine")  # of Xsens: counts of .1 ms
@@ -99,9 +100,10 @@ def _stem(words: str) -> tuple[str, str, str, str | None] | None:
     words = re.sub(r"_?axis(?=_|$)|^axis_", "", words)
     if any(word in words for word in NOT_FORCE):
         return None
-    cut = [(words[:-1].rstrip("_"), words[-1:])]
-    if re.match(r"[xyz]_", words):
-        cut.append((words[2:], words[0]))
+    short = BEHIND.sub("", words)
+    cut = [(whole[:-1].rstrip("_"), whole[-1:]) for whole in dict.fromkeys((words, short))]
+    if re.match(r"[xyz](?:_|gyro|acc)", short):
+        cut.append((short[1:].lstrip("_"), short[0]))
     for body, axis in cut:
         for stem, unit in _without_unit(body) if axis in AXES else ():
             for bare in dict.fromkeys((stem, BEFORE.sub("", stem, count=1) if BEFORE.match(stem) else stem)):
@@ -111,13 +113,23 @@ def _stem(words: str) -> tuple[str, str, str, str | None] | None:
     return None
 
 
+def _from_zero(name: str, names: Sequence[str]) -> str:
+    """A column of an array that is counted from 1, counted from 0: ``dv[1]`` where there are ``dv[3]`` and no ``dv[0]``."""
+    match = re.fullmatch(r"(.*?)\[([1-3])\]", name.strip())
+    if match is None or f"{match[1]}[0]" in names or f"{match[1]}[3]" not in names:
+        return name
+    return f"{match[1]}[{int(match[2]) - 1}]"
+
+
 def clock_of(name: str) -> tuple[bool, str | None]:
     """Whether a heading is a clock's, and the unit it names."""
     bare, unit = split(name)
-    words = plain(bare)
+    words = BEHIND.sub("", plain(bare))
     if words in TENTH_MS:
         return True, "0.1 ms"
-    match = CLOCK.fullmatch(words)
+    if words in ("millis", "micros"):  # of Arduino
+        return True, "ms" if words == "millis" else "us"
+    match = CLOCK.fullmatch(words) or CLOCK.fullmatch(BEFORE.sub("", words, count=1))
     if match is None:
         return False, None
     said = unit_in(unit) if unit else None
@@ -138,8 +150,9 @@ def families(names: Sequence[str]) -> dict[str, list[dict[str, Heading]]]:
     """By sensor, the sets of three headings, x, y and z, that the log has."""
     sets: dict[tuple[str, str], dict[str, Heading]] = {}
     for name in names:
-        heading = heading_of(name)
+        heading = heading_of(_from_zero(name, names))
         if heading is not None:
+            heading = replace(heading, name=name)
             sets.setdefault((heading.sensor, heading.family), {}).setdefault(heading.axis, heading)
     result: dict[str, list[dict[str, Heading]]] = {sensor: [] for pair in BLOCKS.values() for sensor in pair}
     for (sensor, _), axes in sets.items():

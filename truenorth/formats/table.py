@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,19 +12,27 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.formats.behaviour import (
+    JUDGED,
     SURE_GYRO,
+    GyroFacts,
+    Reading,
     accel_readings,
+    are_angles,
     gravity_level,
     gyro_facts,
     gyro_readings,
+    is_usual,
 )
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.choice import choose
 from truenorth.formats.chosen import Choice
 from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
+from truenorth.formats.counts import counts_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
+from truenorth.formats.repeats import without_repeats
+from truenorth.formats.turns import with_angles
 from truenorth.records import COLUMNS, Guess, ImuRecord
 from truenorth.records.imu import Kind
 
@@ -48,14 +56,19 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     UsageError
         A unit of another dimension, or neither time nor rate.
     """
-    source = columns.path.name
+    source, columns = columns.path.name, with_angles(columns)
     choice = choose(columns, layout)
     guesses = choice.guesses
+    gyro, accel = _sensors(columns, layout, choice)
+    columns, kept = without_repeats(columns, choice, gyro, accel)
+    if kept is not None:
+        gyro, accel = gyro[kept], accel[kept]
     if columns.notes:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
-    gyro, accel = _sensors(columns, layout, choice)
+    said_above = counts_above(columns.above)
+    choice.units = {**choice.units, **said_above}
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
-    kind, units = _units(time, gyro, accel, layout, choice, source, guesses)
+    kind, units = _units(time, gyro, accel, layout, choice, said_above, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
     if layout.axes is None:
         layout = _axes(columns, layout, choice, accel, guesses)
@@ -113,7 +126,14 @@ def _place_in_array(name: str) -> int:
 
 
 def _units(
-    time: Array, gyro: Array, accel: Array, layout: Layout, choice: Choice, source: str, guesses: list[Guess]
+    time: Array,
+    gyro: Array,
+    accel: Array,
+    layout: Layout,
+    choice: Choice,
+    above: Container[str],
+    source: str,
+    guesses: list[Guess],
 ) -> tuple[Kind, dict[str, str]]:
     """Kind of the rows, and the units of the sensors."""
     said = {
@@ -121,7 +141,9 @@ def _units(
     }
     kind: Kind | None = layout.kind or choice.kind
     for key, unit in said.items():
-        who = "as the caller says" if key in layout.units else "the heading"
+        who = (
+            "as the caller says" if key in layout.units else "a line above the table" if key in above else "the heading"
+        )
         guesses.append(Guess(f"unit of the {_sensor(key)}", unit, who, 1.0, {"units": {key: unit}}))
     if kind is None and "accel" in said:
         kind = "increments" if _dimension(said["accel"]) == DIMENSIONS["speed"][0] else "rates"
@@ -138,23 +160,59 @@ def _units(
         kinds: tuple[Kind, ...] = ("rates", "increments") if kind is None else (kind,)
         level = gravity_level(accel)
         readings = accel_readings(level, interval, kinds)
+        if not choice.named:
+            readings = [r for r in readings if is_usual("accel", r.unit, r.kind)] or readings
         if not readings:
             raise DataError(f"{source}: {_no_gravity(level, accel, kinds[0], interval)}")
-        options = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
+        options: list[dict[str, Any]] = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
+        best = readings[0]
+        if not is_usual("accel", best.unit, best.kind):
+            usual = ("m/s^2", "g") if best.kind == "rates" else ("m/s",)
+            options = [options[0], *({"units": {"accel": unit}} for unit in usual)]
+            raise UnsureError(
+                f"{source}: the accelerometers look like {best.unit}, which few logs are in, and large forces, a log without "
+                f"gravity or counts may by chance: {best.why}", options, guesses,
+            )  # fmt: skip
         best = take("unit of the accelerometers", readings, options, source, guesses)
         kind, said["accel"] = best.kind, best.unit
     assert kind is not None
     if "gyro" not in said:
         facts = gyro_facts(time, gyro, accel, kind)
+        if kind == "rates" and not facts.turned and are_angles(time, gyro, accel):
+            raise DataError(
+                f"{source}: columns {', '.join(choice.labels[1:4])} turn gravity by what they change by, as angles do; expected "
+                "rates: name the columns of the gyros"
+            )
         readings = gyro_readings(facts, kind, said["accel"])
         if not readings:
             raise DataError(
                 f"{source}: the gyros' values are those of a gyro in no usual unit; say the unit, or check that these are the gyros"
             )
+        _check_rare(facts, readings, gyro, kind, source, guesses)
         said["gyro"] = take(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
+
+
+def _check_rare(
+    facts: GyroFacts, readings: Sequence[Reading], gyro: Array, kind: Kind, source: str, guesses: list[Guess]
+) -> None:
+    """Ask where gyros look like a unit of few logs and do not turn gravity by it, or hold whole numbers, as counts do.
+
+    A vehicle that turns about the vertical looks like a gyro at rest in such a unit. 16.4 counts for one deg/s, as of a common
+    sensor, are nearly mrad/s.
+    """
+    best = readings[0]
+    whole = bool(np.all(gyro[:JUDGED] == np.round(gyro[:JUDGED])))
+    if is_usual("gyro", best.unit, kind) or (facts.turned and not whole):
+        return
+    usual = ("deg/s", "rad/s") if kind == "rates" else ("rad", "deg")
+    options = [{"units": {"gyro": unit}} for unit in (best.unit, *usual)]
+    raise UnsureError(
+        f"{source}: the gyros look like {best.unit}, which few logs are in, and counts may by chance: {best.why}; if they are "
+        "counts, say how large one is, such as 0.061 deg/s", options, guesses,
+    )  # fmt: skip
 
 
 def _sensor(key: str) -> str:

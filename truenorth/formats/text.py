@@ -32,6 +32,7 @@ LONGEST_LINE = 65536
 MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
+MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
 
@@ -192,7 +193,7 @@ def open_table(path: Path) -> TextTable:
         No line of numbers, lines that fit no dialect, or a header of another number of columns.
     """
     text, note = text_of(path)
-    text = without_outer_quotes(text)
+    text = _with_stamps_apart(without_outer_quotes(text))
     head = _head(path, text)
     if not head:
         raise DataError(f"{path.name}: no header and no numbers; the file holds empty lines only")
@@ -223,6 +224,17 @@ def open_table(path: Path) -> TextTable:
         dialect = replace(dialect, decimal=".")
         notes += ("decimal points in some columns, commas in others",)
     return _without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
+
+
+def _with_stamps_apart(text: bytes) -> bytes:
+    """The text with a separator behind the stamps of a serial monitor, which writes ``10:11:12.345 -> `` before each line."""
+    lines = [line[1] for line in islice(_lines(text), SAMPLE) if line[1].strip()]
+    marked = [line for line in lines if MONITOR.match(line)]
+    if len(marked) < 0.8 * len(lines) or not marked:
+        return text
+    rest = marked[-1][MONITOR.match(marked[-1]).end() :]  # type: ignore[union-attr]
+    mark = next((mark for mark in (b",", b";", b"\t") if mark in rest), b" ")
+    return MONITOR.sub(rb"\1" + mark, text)
 
 
 def _lines(text: bytes) -> Iterator[re.Match[bytes]]:
@@ -268,11 +280,13 @@ def _header(
     unit_line = -1
     for k in range(len(above) - 1, -1, -1):
         line = above[k][1]
+        if not line.strip(",;|\t "):
+            continue  # separators and nothing between them
         plain = line.lstrip("#%/ \t") if is_remark(line) else line
         for delimiter in (dialect.delimiter, *DELIMITERS):
             names = Dialect(delimiter, ".").cells(plain)
-            if len(names) == count - 1 and not first_cells[-1]:
-                names = [*names, ""]  # a separator at the end of each row
+            if 2 < len(names) < count and not any(first_cells[len(names) :]) and not all(map(dialect.is_number, names)):
+                names += [""] * (count - len(names))  # separators at the end of each row
             if len(names) == count + 1 and not names[-1]:
                 names = names[:-1]  # a separator at the end of the header alone
             if len(names) == count and not all(map(dialect.is_number, names)):
@@ -290,8 +304,7 @@ def _header(
             units, unit_line = names, k
             continue
         if units is not None:
-            names = [f"{name} [{unit}]" if unit.strip("[]()- ") else name for name, unit in zip(names, units)]
-            names = [name.replace("[[", "[").replace("]]", "]").replace("[(", "[").replace(")]", "]") for name in names]
+            names = [f"{name} [{_bare(unit)}]" if unit.strip("[]()- ") else name for name, unit in zip(names, units)]
         if k > 0 and (whole := _of_groups(dialect.cells(above[k - 1][1]), names)):
             return whole, {k, k - 1, unit_line}
         return names, {k, unit_line}
@@ -317,9 +330,17 @@ def _are_units(cells: Sequence[str]) -> bool:
     """Whether a line under the header holds the units."""
     from truenorth.formats.units import unit_in
 
-    said = [cell.strip("[]() ") for cell in cells]
+    said = [_bare(cell) for cell in cells]
     known = [unit_in(cell) is not None or cell in ("", "-") for cell in said]
     return sum(known) >= 0.7 * len(cells) and any(unit_in(cell) is not None and len(cell) > 1 for cell in said)
+
+
+def _bare(cell: str) -> str:
+    """A unit without the brackets around it; those inside stay: ``m/(s^2)``."""
+    cell = cell.strip()
+    while len(cell) > 1 and cell[0] + cell[-1] in ("[]", "()"):
+        cell = cell[1:-1].strip()
+    return cell
 
 
 def _without_rows(path: Path, text: bytes, head: list[tuple[int, str]], notes: tuple[str, ...]) -> TextTable:
@@ -333,11 +354,12 @@ def _without_rows(path: Path, text: bytes, head: list[tuple[int, str]], notes: t
 
 def _without_a_cut_end(table: TextTable) -> TextTable:
     """Leave out a last line that a logger did not finish: too few cells, or no line end and a cell shorter than above."""
-    text = table.text.rstrip(b"\r\n \t")
+    blanks = b" \t" if table.dialect.delimiter != "\t" else b" "
+    text = table.text.rstrip(b"\r\n" + blanks)
     start = max(text.rfind(b"\n"), text.rfind(b"\r")) + 1
     if start <= len(table.text) - len(table._rows) or start < len(text) - LONGEST_LINE:
         return table  # the first row, which stays to be complained about
-    whole = len(text) < len(table.text.rstrip(b" \t"))
+    whole = len(text) < len(table.text.rstrip(blanks))
     last = table.dialect.cells(text[start:].decode("latin-1"))
     count = len(table.names)
     if len(last) >= count:

@@ -9,15 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.formats.behaviour import accel_readings, gravity_level
+from truenorth.core.units import DIMENSIONS, parse_unit
+from truenorth.formats.behaviour import accel_readings, gravity_level, is_usual
 from truenorth.formats.chosen import MOST_COLUMNS, Choice, with_time
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
+from truenorth.formats.names import plain
+from truenorth.formats.others import are_forces, is_other, quaternions
+from truenorth.formats.units import split, unit_in
 from truenorth.records import COLUMNS, Guess
 
 Array = NDArray[np.float64]
 
+AXIS = re.compile(r"(?<![a-z])[xyz](?![a-z])|(?<=[a-z])[xyz](?![a-z])")
+VEHICLES = {"roll": "x", "pitch": "y", "yaw": "z", "long": "x", "lat": "y", "vert": "z"}
+VEHICLE = re.compile(r"(?<![a-z])(?:roll|pitch|yaw)(?=_?rate)|(?<=rate_)(?:roll|pitch|yaw)|(?<=acc_)(?:long|lat|vert)")
 PART = re.compile(r"(.+)\[\d+\]")  # a column of an array, and no unit behind a name
 
 
@@ -32,29 +39,43 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
             continue  # text
     longest = max((len(v) for v in numbers.values()), default=0)
     numbers = {name: v for name, v in numbers.items() if len(v) == longest}
-    choice = Choice(None, (), [])
+    choice = Choice(None, (), [], named=False)
     if longest >= 3:
         choice = with_time(columns, layout, choice)
     skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
     free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
-    groups = [list(names) for _, names in groupby(free, _variable)]
-    blocks = [group[i : i + 3] for group in groups for i in range(0, len(group) - 2, 3)]
+    if columns.named:
+        free = [name for name in free if not is_other(name)]
+    turned = quaternions({name: numbers[name] for name in free})
+    free = [name for name in free if name not in turned]
+    free = [name for name in free if np.ptp(numbers[name]) > 0.0]  # what never changes, as a covariance, is no sensor
+    at = {name: 0 if columns.named else columns.names.index(name) - k for k, name in enumerate(free)}
+    groups = [list(names) for _, names in groupby(free, lambda name: (_variable(name), at[name]))]
+    blocks = [block for group in groups for block in _blocks(group)]
     clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
     interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
     forces = [
         block for block in blocks
         if _constant(values := np.column_stack([numbers[name] for name in block]))
         and any(
-            accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
+            is_usual("accel", reading.unit, reading.kind)
             for scale in (1.0, 1e-3, 1e-6, 1e-9, 1e-4)
+            for reading in accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
         )
     ]  # fmt: skip
+    blocks = [block for block in blocks if block in forces or not (columns.named and are_forces(block))]
     alone = [pair for group in groups if (pair := _pair(group, blocks, forces))]
     if len(alone) == 1:  # one variable is an IMU by itself, whatever the others are: attitude, for one
         blocks, forces = alone[0]
-    if longest < 3 or not forces or len(blocks) < 2:
-        from truenorth.formats.sensor_folder import hint
+    from truenorth.formats.sensor_folder import hint
 
+    if longest >= 3 and forces and len(blocks) < 2:
+        raise DataError(
+            f"{source}: columns {' '.join(forces[0])} show gravity, and no other three may be gyros among "
+            f"{listed(columns.names)}; expected rates about three axes next to specific forces: name the columns of the gyros"
+            + hint(columns.path)
+        )
+    if longest < 3 or not forces or len(blocks) < 2:
         raise DataError(
             f"{source}: no columns of an IMU among {listed(columns.names)}; expected time, gyro_x .. accel_z (rates "
             "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
@@ -71,8 +92,46 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     names = [*others[0], *forces[0]]
     why = f"the norm of columns {' '.join(forces[0])} is gravity's; {' '.join(others[0])} are the three others"
     choice.sensors = [(name, 1.0) for name in names]
+    choice.units = {**choice.units, **_units(names)}
     choice.guesses.append(Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(COLUMNS["rates"], names))}))
     return choice
+
+
+def _units(names: list[str]) -> dict[str, str]:
+    """Units of rates and specific forces that the headings of three columns agree on."""
+    result = {}
+    for sensor, dimension, three in (("gyro", "angular_rate", names[:3]), ("accel", "acceleration", names[3:])):
+        said = {unit_in(split(name)[1] or "") for name in three}
+        unit = said.pop()
+        if not said and unit is not None and parse_unit(unit)[1] == DIMENSIONS[dimension][0]:
+            result[sensor] = unit
+    return result
+
+
+def _blocks(group: list[str]) -> list[list[str]]:
+    """Threes of columns: those whose names differ by x, y and z alone, in that order, and of the others each three in a row."""
+    axes: dict[str, dict[str, str]] = {}
+    for name in group:
+        for stem, axis in _of_axis(name):
+            axes.setdefault(stem, {}).setdefault(axis, name)
+    threes = {stem: three for stem, three in axes.items() if len(three) == 3}
+    taken = {name: stem for stem, three in threes.items() for name in three.values()}
+    blocks: list[list[str]] = []
+    for is_three, names in groupby(group, lambda name: name in taken):
+        run = list(names)
+        if is_three:
+            blocks += [[threes[stem][axis] for axis in "xyz"] for stem in dict.fromkeys(taken[name] for name in run)]
+        else:
+            blocks += [run[i : i + 3] for i in range(0, len(run) - 2, 3)]
+    return [block for k, block in enumerate(blocks) if block not in blocks[:k]]
+
+
+def _of_axis(name: str) -> list[tuple[str, str]]:
+    """A heading without its axis, and the axis: x, y or z as a word or at the end of one, or that which a vehicle rolls about."""
+    words = plain(split(name)[0])
+    found = [(AXIS.sub("*", words, count=1), match[0]) for match in AXIS.finditer(words)][:1]
+    turned = VEHICLE.search(words)
+    return found or ([(VEHICLE.sub("*", words, count=1), VEHICLES[turned[0]])] if turned else [])
 
 
 def _variable(name: str) -> str:

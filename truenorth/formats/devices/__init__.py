@@ -50,6 +50,7 @@ BEGINNINGS = {
     b"\xfa\xff\x36": "xsens",
     b"ULog\x01\x12\x35": "ulog",
     b"\xa3\x95\x80": "dataflash",
+    b"FMT,": "dataflash",
     b"#ROSBAG": "ros",
     b"\x89MCAP": "ros",
     b"SQLite format 3": "ros",

@@ -1,4 +1,7 @@
-"""ArduPilot DataFlash (.bin) by pymavlink: IMU and MAG of the first instance (axes FRD), GPS. Time is the board's, s."""
+"""ArduPilot DataFlash (.bin, and the text made of it) by pymavlink: IMU and MAG of the first instance (axes FRD), GPS.
+
+Time is the board's, s.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,16 @@ Array = NDArray[np.float64]
 EXTRA = "ardupilot"
 AXES = "FRD"
 FIX_2D = 2
+TEXT = b"FMT,"
 
 
 def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
     """Rates and specific forces; position and velocity (height above mean sea level, as the board has it); magnetic field."""
     from pymavlink import DFReader
 
-    log = DFReader.DFReader_binary(str(path), zero_time_base=True)
+    with path.open("rb") as file:
+        is_text = file.read(len(TEXT)) == TEXT
+    log = (DFReader.DFReader_text if is_text else DFReader.DFReader_binary)(str(path), zero_time_base=True)
     imu: list[list[float]] = []
     gnss: list[list[float]] = []
     field: list[list[float]] = []
@@ -32,6 +38,8 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
                 gnss.append([m.TimeUS * 1e-6, m.Lat, m.Lng, m.Alt, m.Spd, m.GCrs, -m.VZ, m.Status])
     finally:
         log.close()
+    if is_text:  # whose first message the decoder gives twice
+        imu, gnss, field = (rows[1:] if rows[:1] == rows[1:2] else rows for rows in (imu, gnss, field))
     names = ["time [s]", *(f"gyro_{x} [rad/s]" for x in "xyz"), *(f"accel_{x} [m/s^2]" for x in "xyz")]
     found = {"imu": dict(zip(names, np.array(imu).T)) if imu else {}, "gnss": {}, "mag": {}}
     if field:

@@ -1,0 +1,30 @@
+"""How large one count of a log is, where lines above its table say so.
+
+- Gyroflow's ``.gcsv``: ``gscale`` in rad/s, ``ascale`` in g, ``tscale`` in s.
+- The table of Betaflight's and iNAV's explorer of flight logs: ``acc_1G``, the counts of gravity.
+
+Source: Gyroflow, documentation of its log format; Betaflight, ``blackbox.c``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+SCALES = {"gscale": ("gyro", "rad/s"), "ascale": ("accel", "g"), "tscale": ("time", "s")}
+LINE = re.compile(r'\W*(gscale|ascale|tscale|acc_1g)"?\s*[,;:=\t ]\s*"?([\d.]+(?:e[+-]?\d+)?)"?\W*', re.IGNORECASE)
+
+
+def counts_above(above: Sequence[str]) -> dict[str, str]:
+    """Units of ``gyro``, ``accel`` and ``time``, such as ``0.000488281 g``, that the lines above a table name."""
+    found: dict[str, str] = {}
+    for line in above:
+        match = LINE.fullmatch(line.strip())
+        if match is None or not float(match[2]) > 0.0:
+            continue
+        if match[1].lower() == "acc_1g":
+            found["accel"] = f"{1.0 / float(match[2]):.9g} g"
+        else:
+            sensor, unit = SCALES[match[1].lower()]
+            found[sensor] = f"{float(match[2]):.9g} {unit}"
+    return found
