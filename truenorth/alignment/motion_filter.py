@@ -36,8 +36,8 @@ MOST_FITS = 12  # of passes with a stale motion
 class _Fits:
     """Motions fitted to velocities along E, N, U; a velocity that was searched or fitted is not again."""
 
-    def __init__(self, interval: float, walks: Walks) -> None:
-        self.interval, self.walks = interval, walks
+    def __init__(self, interval: float, walks: Walks, *, slow_is_motion: bool = False) -> None:
+        self.interval, self.walks, self.slow_is_motion = interval, walks, slow_is_motion
         self.searched: dict[tuple[int, bytes], tuple[Series, AxisMotion]] = {}
         self.found: dict[tuple[int, bytes, AxisMotion | None], AxisMotion] = {}
 
@@ -50,7 +50,7 @@ class _Fits:
     def _along(self, axis: int, velocity: Array, guess: AxisMotion | None) -> AxisMotion:
         seen = axis, velocity.tobytes()
         if seen not in self.searched:
-            series = Series(velocity, self.interval, self.walks)
+            series = Series(velocity, self.interval, self.walks, slow_is_motion=self.slow_is_motion)
             self.searched[seen] = series, search(series, MOST_OSCILLATORS[axis])
         if (*seen, guess) not in self.found:
             self.found[*seen, guess] = with_guess(*self.searched[seen], guess)
@@ -59,6 +59,16 @@ class _Fits:
 
 class MotionFilter:
     """A Kalman filter whose states hold the base's motion, as fitted to a residual; fitted anew about the first answers.
+
+    Parameters
+    ----------
+    residual : (K, 3) array, m/s
+    interval : float, s
+    walks : Walks
+    fits : int
+        Anew, after the first pass.
+    poor : bool
+        Of poor sensors on an indexer: errors of second order are slow then, and no walks. What they leave passes for motion.
 
     Attributes
     ----------
@@ -70,9 +80,9 @@ class MotionFilter:
     stale = False
     likely = -math.inf  # twice the log-likelihood of the last pass
 
-    def __init__(self, residual: Array, interval: float, walks: Walks, fits: int = 1) -> None:
+    def __init__(self, residual: Array, interval: float, walks: Walks, fits: int = 1, *, poor: bool = False) -> None:
         self.interval, self.walks, self.fits, self.passes = interval, walks, fits, 0
-        self.fit = _Fits(interval, walks)
+        self.fit = _Fits(interval, walks, slow_is_motion=poor)
         self.motion = self.fit(residual)
 
     def __call__(self, system: LinearSystem) -> Filtered:

@@ -79,9 +79,19 @@ class Series:
     walks : Walks
     others : (K, p) array, optional
         What is taken out besides the trend, each of unknown size.
+    slow_is_motion : bool
+        Whether a search takes what is slow for motion, and not for the walks.
     """
 
-    def __init__(self, residual: Array, interval: float, walks: Walks, others: Array | None = None) -> None:
+    def __init__(
+        self,
+        residual: Array,
+        interval: float,
+        walks: Walks,
+        others: Array | None = None,
+        *,
+        slow_is_motion: bool = False,
+    ) -> None:
         K = len(residual)
         basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, K), min(TREND, max(K - 8, 0)))
         if others is not None:
@@ -97,7 +107,8 @@ class Series:
         self.taper = np.fft.irfft(np.abs(spectrum) ** 2)[:K]  # its autocorrelation
         self.periodogram = np.abs(np.fft.rfft(taper * self.detrended)) ** 2
         self.frequencies: Array = np.asarray(2 * np.pi * np.fft.rfftfreq(K, interval), dtype=np.float64)
-        self.walked = walks.periodogram(self.frequencies, interval)
+        walked = walks.periodogram(self.frequencies, interval)
+        self.walked = np.zeros_like(walked) if slow_is_motion else walked
         self.lags: Array = interval * np.arange(K, dtype=np.float64)
         self.known: dict[
             AxisMotion, float

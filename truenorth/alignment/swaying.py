@@ -196,7 +196,7 @@ def _with_motion(
     log, residual = _settled(start, mount, turned)
     model, position = start.model, start.position
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * gravity_of_place(position.lat, position.alt))
-    return log, MotionFilter(residual, float(np.mean(log.integrals.intervals)), walks, fits)
+    return log, MotionFilter(residual, float(np.mean(log.integrals.intervals)), walks, fits, poor=not log.sways)
 
 
 def _filtered(log: StayingLog, estimator: MotionFilter, misfit: Callable[[Position], float]) -> SwayAlignment:
