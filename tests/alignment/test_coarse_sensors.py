@@ -8,7 +8,7 @@ import pytest
 from tests.runs import some
 from truenorth.aiding.aids import Indexer
 from truenorth.alignment import align
-from truenorth.alignment.coarse_sensors import calibrated, known_sensors
+from truenorth.alignment.coarse_sensors import calibrated, known_sensors, matrix_evidence
 from truenorth.alignment.encoder_angles import angles_at
 from truenorth.alignment.fine import CoarseStart
 from truenorth.alignment.swaying import Mount
@@ -142,3 +142,14 @@ def test_gyros_that_turn_as_gravity_does_without_their_biases():
         (item,) = (item for item in wrong.evidence if item.key == "encoder.gyro_matrix")
         assert item.figures["axis"] == item.figures["about"] == "xyz"[axis]
         assert wrong.status == "inconsistent"
+
+
+def test_a_slow_sway_is_no_matrix_of_the_gyros():
+    """Of a body that turns by 30 deg in a minute entries of 4 to 20 of their sigmas are found, and none is shown."""
+    tone = {"amplitude": "30 deg", "period": "60 s", "phase": "40 deg"}
+    for run in range(3):
+        start, mount, spec, _ = drawn(
+            "consumer", 5, run, lambda made: made | {"motion": made["motion"] | {"tones": {"heading": [tone]}}}
+        )
+        start = start._replace(sensors=known_sensors(start, mount.C_sb, spec))
+        assert matrix_evidence(start, spec) == []

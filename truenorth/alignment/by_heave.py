@@ -70,7 +70,7 @@ def _against(heave: Heave, read: Reading) -> float:
 
 def _gained(item: Evidence) -> float:
     """By how much the whole log is likelier with the gyros put right (:mod:`~truenorth.alignment.gyro_matrix`); else zero."""
-    return float(item.figures.get("ratio", 0.0))
+    return float(item.figures.get("ratio", 0.0)) if item.key.startswith("tilt.") else 0.0
 
 
 def scaled(scale: Array) -> Reading:

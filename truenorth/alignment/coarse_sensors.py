@@ -85,11 +85,17 @@ def known_sensors(start: CoarseStart, C_sb: Array, turned: ImuSpec | None) -> Kn
 
 
 def matrix_evidence(start: CoarseStart, spec: ImuSpec) -> list[Evidence]:
-    """The entry of the gyros' matrix that is furthest beyond its specification: units, axes, signs, or the encoder's."""
+    """The entry of the gyros' matrix that is furthest beyond its specification: units, axes, signs, or the encoder's.
+
+    Of what was found counts what the log shows next to a sway as large as it leaves: by a slow one a body makes entries of its own.
+    """
     known = start.sensors
     if known is None or len(known.mean) == BIASES.stop - BIASES.start:
         return []
-    M = known.mean[GYRO_MATRIX].reshape(3, 3)
+    prior = prior_of(start.P_bias, spec=spec)
+    variance = np.diag(prior.P)[prior.sensors]
+    as_said = np.divide(known.mean, variance, out=np.zeros_like(variance), where=variance > 0.0)
+    M = (known.mean - known.P @ as_said)[GYRO_MATRIX].reshape(3, 3)
     allowed = np.where(np.eye(3, dtype=bool), spec.gyro_scale_factor, spec.gyro_misalignment)
     times = np.abs(M) / np.maximum(allowed, math.ulp(0.0))
     row, column = divmod(int(np.argmax(times)), 3)
