@@ -48,10 +48,9 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
         free = [name for name in free if not is_other(name)]
     turned = quaternions({name: numbers[name] for name in free})
     free = [name for name in free if name not in turned]
-    free = [name for name in free if np.ptp(numbers[name]) > 0.0]  # what never changes, as a covariance, is no sensor
-    at = {name: 0 if columns.named else columns.names.index(name) - k for k, name in enumerate(free)}
-    groups = [list(names) for _, names in groupby(free, lambda name: (_variable(name), at[name]))]
-    blocks = [block for group in groups for block in _blocks(group)]
+    at = {name: columns.names.index(name) - k for k, name in enumerate(free)}  # changes where a column is left out
+    groups = [list(names) for _, names in groupby(free, _variable)]
+    blocks = [block for group in groups for block in _blocks(group, at)]
     clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
     interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
     forces = [
@@ -64,6 +63,10 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
         )
     ]  # fmt: skip
     blocks = [block for block in blocks if block in forces or not (columns.named and are_forces(block))]
+    still = [block for block in blocks if not any(np.ptp(numbers[name]) > 0.0 for name in block)]
+    forces = _without(still, forces)
+    others = _without(still, [block for block in blocks if block not in forces])
+    blocks = [block for block in blocks if block in forces or block in others]
     alone = [pair for group in groups if (pair := _pair(group, blocks, forces))]
     if len(alone) == 1:  # one variable is an IMU by itself, whatever the others are: attitude, for one
         blocks, forces = alone[0]
@@ -108,8 +111,16 @@ def _units(names: list[str]) -> dict[str, str]:
     return result
 
 
-def _blocks(group: list[str]) -> list[list[str]]:
-    """Threes of columns: those whose names differ by x, y and z alone, in that order, and of the others each three in a row."""
+def _without(still: list[list[str]], blocks: list[list[str]]) -> list[list[str]]:
+    """The blocks that change, or all where none does: what never changes, as a covariance, is no sensor if there is another."""
+    return [block for block in blocks if block not in still] or blocks
+
+
+def _blocks(group: list[str], at: dict[str, int]) -> list[list[str]]:
+    """Threes of columns: those whose names differ by x, y and z alone, in that order, and of the others each three in a row.
+
+    A row ends where `at` changes: no column is missing inside a three.
+    """
     axes: dict[str, dict[str, str]] = {}
     for name in group:
         for stem, axis in _of_axis(name):
@@ -117,7 +128,7 @@ def _blocks(group: list[str]) -> list[list[str]]:
     threes = {stem: three for stem, three in axes.items() if len(three) == 3}
     taken = {name: stem for stem, three in threes.items() for name in three.values()}
     blocks: list[list[str]] = []
-    for is_three, names in groupby(group, lambda name: name in taken):
+    for (is_three, _), names in groupby(group, lambda name: (name in taken, name not in taken and at[name])):
         run = list(names)
         if is_three:
             blocks += [[threes[stem][axis] for axis in "xyz"] for stem in dict.fromkeys(taken[name] for name in run)]

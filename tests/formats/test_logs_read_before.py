@@ -1,0 +1,39 @@
+"""Logs that need no rule about other things: a rule for these does not hide a sensor, turn a sign or take another's clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.formats.test_field_logs import MOVED, rows
+from truenorth.formats import read_imu
+
+TIME, RATES, FORCES = MOVED.time, MOVED.gyro, MOVED.accel
+NOISE = np.random.default_rng(3).standard_normal((len(TIME), 4))
+STILL_RATES, STILL_FORCES = 2e-3 * NOISE[:, :3], np.array([9.8, 0.1, -0.2]) + 0.02 * NOISE[:, 1:]
+
+
+def log(tmp_path, header, *parts, above="", name="log.csv"):
+    """A table on disk; no header where it is empty."""
+    path = tmp_path / name
+    path.write_text(above + (header + "\n" if header else "") + rows(*parts))
+    return path
+
+
+# ---------------------------------------------------------------------------------------------------- constant columns
+
+
+@pytest.mark.parametrize("header", ["t,u1,u2,u3,s1,s2,s3,k", "", "t,u1,u2,u3,s1,s2,s3"])
+def test_a_constant_column_stays_in_its_three(tmp_path, header):
+    gyro, extra = STILL_RATES * [1, 1, 0], [0.05 * NOISE[:, 3]] if header.endswith("k") else []
+    path = log(tmp_path, header, TIME, gyro, STILL_FORCES, *extra)
+    record = read_imu(path, units={"gyro": "rad/s"})
+    np.testing.assert_allclose(record.gyro, gyro, atol=1e-8)
+    np.testing.assert_allclose(record.accel, STILL_FORCES, atol=1e-7)
+
+
+def test_a_log_without_noise_and_one_with_two_constant_forces(tmp_path):
+    level = np.column_stack([0 * TIME, 0 * TIME, 9.8 + np.round(0.02 * NOISE[:, 0], 2)])
+    for forces in (level, np.tile([0.0, 0.0, 9.8], (len(TIME), 1))):
+        path = log(tmp_path, "", TIME, STILL_RATES, forces)
+        np.testing.assert_allclose(read_imu(path, units={"gyro": "rad/s"}).accel, forces, atol=1e-7)
