@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.formats.test_field_logs import MOVED, rows
+from tests.formats.test_field_logs import MOVED, G, is_read, rows
 from truenorth.formats import read_imu
 
 TIME, RATES, FORCES = MOVED.time, MOVED.gyro, MOVED.accel
@@ -37,3 +37,26 @@ def test_a_log_without_noise_and_one_with_two_constant_forces(tmp_path):
     for forces in (level, np.tile([0.0, 0.0, 9.8], (len(TIME), 1))):
         path = log(tmp_path, "", TIME, STILL_RATES, forces)
         np.testing.assert_allclose(read_imu(path, units={"gyro": "rad/s"}).accel, forces, atol=1e-7)
+
+
+# ------------------------------------------------------------------------------------------------------ signs and sizes
+
+
+@pytest.mark.parametrize(
+    ("pattern", "gyro", "size"),
+    [
+        ("accelerometerAcceleration{}", "gyro{}", 1),
+        ("Accelerometer Acceleration {} (m/s^2)", "Gyro {} (rad/s)", 1),
+        ("accelerometerAcceleration{}(G)", "gyro{}", G),
+        ("Accelerometer Acceleration {} (m/s^2)", "gyroRotation{}(rad/s)", 1),
+    ],
+)
+def test_accelerations_of_other_programs_than_an_iphones_keep_their_signs(tmp_path, pattern, gyro, size):
+    header = ",".join(["time", *(pattern.format(axis) for axis in "XYZ"), *(gyro.format(axis) for axis in "XYZ")])
+    is_read(log(tmp_path, header, TIME, FORCES / size, RATES))
+
+
+def test_an_iphones_accelerations_without_a_unit_have_their_signs_turned(tmp_path):
+    header = "accelerometerTimestamp_sinceReboot," + ",".join(f"accelerometerAcceleration{axis}" for axis in "XYZ")
+    header += "," + ",".join(f"gyroRotation{axis}" for axis in "XYZ")
+    is_read(log(tmp_path, header, TIME, -FORCES / G, RATES))
