@@ -65,8 +65,8 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
         gyro, accel = gyro[kept], accel[kept]
     if columns.notes:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
-    said_above = counts_above(columns.above)
-    choice.units = {**choice.units, **said_above}
+    said_above = _said_above(columns, layout, choice, accel)
+    choice.units = {**said_above, **choice.units}
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
     kind, units = _units(time, gyro, accel, layout, choice, said_above, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
@@ -77,6 +77,15 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     return finish(
         time, gyro, accel, kind, layout, source, labels=choice.labels, place=columns.place, taken_for=tuple(guesses)
     )
+
+
+def _said_above(columns: Columns, layout: Layout, choice: Choice, accel: Array) -> dict[str, str]:
+    """Sizes of counts that lines above the table name: of what has no unit otherwise, and no gravity in m/s^2 or g as it is."""
+    found = {} if choice.documented else counts_above(columns.above)
+    counted = bool(np.all(accel[:JUDGED] == np.round(accel[:JUDGED])))
+    if not counted and accel_readings(gravity_level(accel), np.nan, ("rates",), ("m/s^2", "g")):
+        found.pop("accel", None)
+    return {key: unit for key, unit in found.items() if key not in choice.units and key not in layout.units}
 
 
 def _sensors(columns: Columns, layout: Layout, choice: Choice) -> tuple[Array, Array]:
