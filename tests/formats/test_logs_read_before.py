@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.formats.corpus.truth import DEG
 from tests.formats.test_field_logs import MOVED, G, is_read, rows
 from truenorth.formats import read_imu
+from truenorth.formats.names import clock_of
 
 TIME, RATES, FORCES = MOVED.time, MOVED.gyro, MOVED.accel
 NOISE = np.random.default_rng(3).standard_normal((len(TIME), 4))
@@ -60,3 +62,35 @@ def test_an_iphones_accelerations_without_a_unit_have_their_signs_turned(tmp_pat
     header = "accelerometerTimestamp_sinceReboot," + ",".join(f"accelerometerAcceleration{axis}" for axis in "XYZ")
     header += "," + ",".join(f"gyroRotation{axis}" for axis in "XYZ")
     is_read(log(tmp_path, header, TIME, -FORCES / G, RATES))
+
+
+@pytest.mark.parametrize("line", ['"acc_1G","2048"\n', "ascale,0.00048828125\n"])
+def test_a_heading_and_the_caller_win_over_a_line_above_the_table(tmp_path, line):
+    above = "gscale,0.00122173047\n" + line
+    header = "t,gx [deg/s],gy [deg/s],gz [deg/s],ax [m/s^2],ay [m/s^2],az [m/s^2]"
+    is_read(log(tmp_path, header, TIME, RATES / DEG, FORCES, above=above))
+    path = log(tmp_path, "t,gx,gy,gz,ax,ay,az", TIME, RATES / DEG, FORCES, above=above)
+    is_read(path, units={"gyro": "deg/s", "accel": "m/s^2"})
+    is_read(path, units={"gyro": "deg/s"})
+
+
+# -------------------------------------------------------------------------------------------------------------- clocks
+
+
+@pytest.mark.parametrize(
+    "name", "T1 t1 t2 tb TB b_t time2 clock1 left_t T1_(degC) T_(degC)".replace("_(", "~(").split()
+)
+def test_what_rises_next_to_the_clock_is_no_clock(name):
+    assert clock_of(name.replace("~", " ")) == (False, None)
+
+
+@pytest.mark.parametrize("name", ["imu_t", "imu0_time", "raw_time", "Shimmer_67AF_Timestamp_Unix_CAL", "device_time"])
+def test_a_word_before_a_clock_leaves_it_one(name):
+    assert clock_of(name) == (True, None)
+
+
+def test_a_clock_without_a_word_before_it_comes_first(tmp_path):
+    """The temperature that rises, and the time of another computer."""
+    for header, other in (("T1 (degC)", 20.0 + 0.02 * TIME), ("raw_time", 2.0 * TIME)):
+        path = log(tmp_path, f"{header},timestamp,gx,gy,gz,ax,ay,az", other, TIME, RATES, FORCES)
+        is_read(path)
