@@ -7,7 +7,7 @@ import pytest
 
 from tests.formats.corpus.truth import DEG
 from tests.formats.test_field_logs import MOVED, G, is_read, rows
-from truenorth.formats import read_imu
+from truenorth.formats import UnsureError, read_imu
 from truenorth.formats.names import clock_of
 
 TIME, RATES, FORCES = MOVED.time, MOVED.gyro, MOVED.accel
@@ -94,3 +94,36 @@ def test_a_clock_without_a_word_before_it_comes_first(tmp_path):
     for header, other in (("T1 (degC)", 20.0 + 0.02 * TIME), ("raw_time", 2.0 * TIME)):
         path = log(tmp_path, f"{header},timestamp,gx,gy,gz,ax,ay,az", other, TIME, RATES, FORCES)
         is_read(path)
+
+
+# -------------------------------------------------------------------------------------------------------------- angles
+
+
+@pytest.mark.parametrize("names", ["gx,gy,gz", "u1,u2,u3", "rotX,rotY,rotZ"])
+def test_the_rates_of_a_car_are_no_angles(tmp_path, names):
+    """A car that turns leans a little and is pushed aside: as if the changes of its rate were the turns of gravity."""
+    random, time, asked = np.random.default_rng(3), np.arange(3000) / 100, []
+    for _ in range(8):
+        times = random.uniform(0, 30, 3), random.uniform(1, 4, 3)
+        turns = np.exp(-0.5 * ((time[:, None] - times[0]) / times[1]) ** 2)
+        yaw = turns @ (random.uniform(0.1, 0.4, 3) * random.choice([-1, 1], 3))
+        push = turns[:, ::-1] @ random.uniform(-1.5, 1.5, 3)
+        rates = np.column_stack([np.gradient(-0.1 * yaw, time), np.gradient(0.01 * push, time), yaw])
+        rates += 2e-3 * random.standard_normal((3000, 3))
+        forces = np.column_stack([push, 10 * yaw, 0 * time + 9.8]) + 0.3 * random.standard_normal((3000, 3))
+        path = log(tmp_path, f"time,{names},ax,ay,az", time, rates, forces)
+        try:
+            np.testing.assert_allclose(read_imu(path).gyro, rates, atol=1e-6)
+        except UnsureError as error:
+            asked.append(str(error))
+    assert not any("angles" in question for question in asked)
+
+
+def test_angles_are_asked_about_and_the_answer_counts(tmp_path):
+    angles = np.cumsum(RATES, axis=0) * 0.01 / DEG
+    path = log(tmp_path, "time,rotX,rotY,rotZ,accX,accY,accZ", TIME, angles, FORCES)
+    with pytest.raises(UnsureError, match="turn gravity by what they change by") as said:
+        read_imu(path)
+    assert len(said.value.options) == 3
+    np.testing.assert_allclose(read_imu(path, units={"gyro": "deg/s"}).gyro, angles * DEG, atol=1e-6)
+    is_read(log(tmp_path, "time,gx,gy,gz,ax,ay,az", TIME, RATES, FORCES))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from typing import Any
@@ -31,6 +32,7 @@ from truenorth.formats.columns import Columns
 from truenorth.formats.counts import counts_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
+from truenorth.formats.names import heading_of, plain
 from truenorth.formats.repeats import without_repeats
 from truenorth.formats.turns import with_angles
 from truenorth.records import COLUMNS, Guess, ImuRecord
@@ -38,6 +40,8 @@ from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
+RATE = re.compile(r"rate|gyr|omega|vel|speed|dps|rad_s|deg_s|(?:^|_)w(?:_|[xyz]|$)|ω")
+ANGLE = re.compile(r"rot|ang|theta")
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
@@ -187,11 +191,13 @@ def _units(
     assert kind is not None
     if "gyro" not in said:
         facts = gyro_facts(time, gyro, accel, kind)
-        if kind == "rates" and not facts.turned and are_angles(time, gyro, accel):
-            raise DataError(
+        asked = kind == "rates" and not facts.turned and _may_be_angles(choice.labels[1:4], layout)
+        if asked and are_angles(time, gyro, accel, facts.turning.best_agreement):
+            own = {"columns": dict(zip(COLUMNS["rates"], choice.labels[1:4]))}
+            raise UnsureError(
                 f"{source}: columns {', '.join(choice.labels[1:4])} turn gravity by what they change by, as angles do; expected "
-                "rates: name the columns of the gyros"
-            )
+                "rates: name the columns of the gyros", [own, {"units": {"gyro": "deg/s"}}, {"units": {"gyro": "rad/s"}}], guesses,
+            )  # fmt: skip
         readings = gyro_readings(facts, kind, said["accel"])
         if not readings:
             raise DataError(
@@ -202,6 +208,14 @@ def _units(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
+
+
+def _may_be_angles(names: Sequence[str], layout: Layout) -> bool:
+    """Whether neither the caller nor their names say that columns are rates: ``rotX``, ``theta_x`` and unknown ones."""
+    by_caller = "gyro" in layout.units or any(ours.startswith("gyro") for ours in layout.columns)
+    headings = [heading_of(name) for name in names]
+    told = all(heading is not None and ANGLE.search(heading.family) is None for heading in headings)
+    return not by_caller and not told and not any(RATE.search(plain(name)) for name in names)
 
 
 def _check_rare(
