@@ -127,3 +127,36 @@ def test_angles_are_asked_about_and_the_answer_counts(tmp_path):
     assert len(said.value.options) == 3
     np.testing.assert_allclose(read_imu(path, units={"gyro": "deg/s"}).gyro, angles * DEG, atol=1e-6)
     is_read(log(tmp_path, "time,gx,gy,gz,ax,ay,az", TIME, RATES, FORCES))
+
+
+# ------------------------------------------------------------------------------------------------- names of other things
+
+
+@pytest.mark.parametrize(
+    ("names", "size", "force"),
+    [
+        ("p,q,r,nx,ny,nz", 1, G),
+        ("P (rad/s),Q (rad/s),R (rad/s),Nx (g),Ny (g),Nz (g)", 1, G),
+        ("p_dps,q_dps,r_dps,nx_g,ny_g,nz_g", DEG, G),
+        ("roll_vel,pitch_vel,yaw_vel,acc_x,acc_y,acc_z", 1, 1),
+        ("roll_speed,pitch_speed,yaw_speed,x_acc,y_acc,z_acc", 1, 1),
+        ("roll_w,pitch_w,yaw_w,ax,ay,az", 1, 1),
+        ("roll (deg/s),pitch (deg/s),yaw (deg/s),ax,ay,az", DEG, 1),
+        ("vel_ang_x,vel_ang_y,vel_ang_z,acc_x,acc_y,acc_z", 1, 1),
+        ("vel_x,vel_y,vel_z,acel_x,acel_y,acel_z", 1, 1),
+        ("w_fwd,w_left,w_up,f_fwd,f_left,f_up", 1, 1),
+        ("hx,hy,hz,bx,by,bz", 1, 1),
+        ("frame_x,frame_y,frame_z,frame2_x,frame2_y,frame2_z", 1, 1),
+        ("dax,day,daz,u_x,u_y,u_z", 1, 1),
+    ],
+)
+def test_names_of_gyros_that_have_words_of_other_things(tmp_path, names, size, force):
+    is_read(log(tmp_path, f"time,{names}", TIME, RATES / size, FORCES / force))
+
+
+@pytest.mark.parametrize("names", ["vel_x,vel_y,vel_z", "rotx [deg],roty [deg],rotz [deg]"])
+def test_columns_that_say_no_rates_are_asked_about(tmp_path, names):
+    path = log(tmp_path, f"time,{names},ax,ay,az", TIME, RATES / DEG, FORCES)
+    with pytest.raises(UnsureError, match="by their names are no rates") as said:
+        read_imu(path)
+    is_read(path, columns=said.value.options[0]["columns"], units={"gyro": "deg/s"})
