@@ -214,8 +214,8 @@ def _may_be_angles(names: Sequence[str], layout: Layout) -> bool:
     """Whether neither the caller nor their names say that columns are rates: ``rotX``, ``theta_x`` and unknown ones."""
     by_caller = "gyro" in layout.units or any(ours.startswith("gyro") for ours in layout.columns)
     headings = [heading_of(name) for name in names]
-    told = all(heading is not None and ANGLE.search(heading.family) is None for heading in headings)
-    return not by_caller and not told and not any(RATE.search(plain(name)) for name in names)
+    rates = all(heading is not None and ANGLE.search(heading.family) is None for heading in headings)
+    return not by_caller and not rates and not any(RATE.search(plain(name)) for name in names)
 
 
 def _check_rare(
