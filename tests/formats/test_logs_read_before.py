@@ -176,3 +176,23 @@ def test_a_sentence_of_a_receiver_above_a_table(tmp_path):
     sentence = "$GPGGA,100000,5230.0,N,01320.0,E,1,8,1,30,M,0,M,,*47\n"
     path = log(tmp_path, "time,ax,ay,az,gx,gy,gz", TIME, FORCES, RATES, above=sentence)
     is_read(path)
+
+
+def test_accelerations_in_ug_are_read(tmp_path):
+    forces = STILL_FORCES * (G / np.linalg.norm(np.median(STILL_FORCES, axis=0)))
+    path = log(tmp_path, "time,acc_x,acc_y,acc_z,gyro_x,gyro_y,gyro_z", TIME, forces / G * 1e6, STILL_RATES)
+    np.testing.assert_allclose(read_imu(path, units={"gyro": "rad/s"}).accel, forces, atol=1e-5)
+
+
+def test_accelerations_without_gravity_next_to_a_phones_rates_are_asked_about(tmp_path):
+    stems = {"motionRotationRate": "rad/s", "motionUserAcceleration": "G", "motionGravity": "G"}
+    names = [f"{stem}{axis}({unit})" for stem, unit in stems.items() for axis in "XYZ"]
+    path = log(tmp_path, ",".join(["t", *names]), TIME, RATES, 0.02 * NOISE[:, :3], FORCES / G)
+    with pytest.raises(UnsureError, match="2 sets of three columns may be the gyros"):
+        read_imu(path)
+
+
+def test_gravity_alone_is_not_taken_for_specific_force(tmp_path):
+    path = log(tmp_path, "t,u1,u2,u3,gravityX (g),gravityY (g),gravityZ (g)", TIME, RATES, FORCES / G)
+    with pytest.raises(UnsureError, match="show nothing else by their names"):
+        read_imu(path)

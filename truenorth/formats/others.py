@@ -33,7 +33,7 @@ TURN_OR_FORCE = re.compile(
 )
 OF_ANGLES = re.compile(r"rot|ang(?!.*(?:vel|rate|inc))")
 DOUBTFUL = re.compile(  # with an axis: what may be a sensor's own name where the log has no other gyros
-    r"(?:h|vel|velocity|speed|spd|frame\d*|vector|rc|id|debug|current|index|setpoint|second|motor)_?[xyz]"
+    r"(?:h|vel|velocity|speed|spd|frame\d*|vector|rc|id|debug|current|index|setpoint|second|motor|(?:\w+_)?grav(?:ity)?)_?[xyz]"
 )
 FORCE = re.compile(r"acc(?!ur)|force")
 PART_OF_QUATERNION = re.compile(r"(?:^|_)d?q_?[0-3wxyz]$|quat")
@@ -68,6 +68,8 @@ def says_motion(name: str) -> bool:
     bare, unit = split(name)
     words = plain(bare).split("_")
     said = [None if unit is None else unit_in(unit)]
+    if "grav" in plain(bare):  # gravity alone
+        return False
     said += [unit_in("_".join(words[-count:])) for count in (1, 2, 3, 4) if unit is None and len(words) > count]
     wins = [DIMENSIONS[kind][0] for kind in ("angular_rate", "acceleration")]
     found = [one for one in said if one is not None and one.casefold() != "g" and parse_unit(one)[1] in wins]

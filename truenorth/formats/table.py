@@ -23,6 +23,7 @@ from truenorth.formats.behaviour import (
     gyro_facts,
     gyro_readings,
     is_usual,
+    size,
 )
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.choice import choose
@@ -42,6 +43,7 @@ Array = NDArray[np.float64]
 
 RATE = re.compile(r"rate|gyr|omega|vel|speed|dps|rad_s|deg_s|(?:^|_)w(?:_|[xyz]|$)|ω")
 ANGLE = re.compile(r"rot|ang|theta")
+AT_REST = 2e-3  # by which the specific force at rest in ug differs from gravity, with the sensors' errors
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
@@ -179,7 +181,10 @@ def _units(
             raise DataError(f"{source}: {_no_gravity(level, accel, kinds[0], interval)}")
         options: list[dict[str, Any]] = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
         best = readings[0]
-        if not is_usual("accel", best.unit, best.kind):
+        exactly = (
+            best.unit == "ug" and abs(level * size("ug") / 9.80665 - 1.0) < AT_REST
+        )  # no other numbers are as large
+        if not is_usual("accel", best.unit, best.kind) and not exactly:
             usual = ("m/s^2", "g") if best.kind == "rates" else ("m/s",)
             options = [options[0], *({"units": {"accel": unit}} for unit in usual)]
             raise UnsureError(

@@ -45,7 +45,7 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
     free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
     left_out = others_of(free, [list(three.values()) for three in _threes(free).values()]) if columns.named else set()
-    blocks, forces = _sets(columns, choice, numbers, free, left_out)
+    blocks, forces = _sets(columns, choice, numbers, free, left_out, columns.named)
     surely = {name for name in left_out if not is_doubtful(name)}
     if surely < left_out and (not forces or len(blocks) < 2):  # names that may be those of sensors all the same
         blocks, forces = _sets(columns, choice, numbers, free, surely)
@@ -72,7 +72,13 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
             + ", ".join(" ".join(block) for block in several), options, choice.guesses,
         )  # fmt: skip
     names = [*others[0], *forces[0]]
-    if columns.named and left_out & set(others[0]) and needs_a_question(others[0], forces[0]):
+    if left_out & set(forces[0]) and any("grav" in plain(name) for name in forces[0]):
+        raise UnsureError(
+            f"{source}: no other columns than {' '.join(forces[0])} show gravity, and they show nothing else by their names: name "
+            "the columns of the accelerometers",
+            [{"columns": {f"accel_{axis}": name for axis, name in zip("xyz", forces[0])}}], choice.guesses,
+        )  # fmt: skip
+    if left_out & set(others[0]) and needs_a_question(others[0], forces[0]):
         raise UnsureError(
             f"{source}: columns {' '.join(forces[0])} show gravity, and no other three may be gyros than {' '.join(others[0])}, "
             "which by their names are no rates: name the columns of the gyros",
@@ -86,7 +92,12 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
 
 
 def _sets(
-    columns: Columns, choice: Choice, numbers: dict[str, Array], names: list[str], left_out: set[str]
+    columns: Columns,
+    choice: Choice,
+    numbers: dict[str, Array],
+    names: list[str],
+    left_out: set[str],
+    strictly: bool = False,
 ) -> tuple[list[list[str]], list[list[str]]]:
     """Threes of columns that may be sensors, and those of them that show gravity."""
     free = [name for name in names if name not in left_out]
@@ -106,7 +117,7 @@ def _sets(
             for reading in accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
         )
     ]  # fmt: skip
-    blocks = [block for block in blocks if block in forces or not (columns.named and are_forces(block))]
+    blocks = [block for block in blocks if block in forces or not (strictly and are_forces(block))]
     still = [block for block in blocks if not any(np.ptp(numbers[name]) > 0.0 for name in block)]
     forces = _without(still, forces)
     others = _without(still, [block for block in blocks if block not in forces])
