@@ -43,6 +43,8 @@ BIAS_RATIOS = np.logspace(0.0, 4.0, 17)  # bias, deg/h, over random walk, deg/sq
 TYPICAL, TYPICAL_FORCE, WORST_FORCE_WALK = DEG / 60.0 * 0.2, 80e-6 * G, 400e-6 * G  # rad/sqrt(s), m/s/sqrt(s)
 CLASS_DECADES = 0.6
 NO_UNIT = 1.1  # of the logarithm, by which the unit that fits best turns gravity too far or not enough: counts, for one
+LARGE_TURN = 3.0 * DEG  # of two axes: what angles must turn by to be known from rates
+FAR_BETTER = 0.5  # of the agreement of angles: what that of rates must stay below
 ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less than in rad or deg
 DECADE = 0.25  # decades by which those limits are soft
 
@@ -161,10 +163,12 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     return GyroFacts(turning, mean, wander, walk, largest, force_walk)
 
 
-def are_angles(time: Array, gyro: Array, accel: Array) -> bool:
+def are_angles(time: Array, gyro: Array, accel: Array, as_rates: float) -> bool:
     """Whether columns taken for rates are angles: what they change by turns gravity as rates would, and they do not.
 
     Roll, pitch and yaw of a base that tilts little change as the rates about its axes. Angles that jump at 360 deg are not seen.
+    The turns are large about two axes: a vehicle that brakes and leans seems to tilt a little. `as_rates` is the agreement of
+    the columns as they are, NaN where nothing turned.
     """
     time, gyro, accel = time[:JUDGED], gyro[:JUDGED], accel[:JUDGED]
     interval = float(np.median(np.diff(time)))
@@ -175,8 +179,12 @@ def are_angles(time: Array, gyro: Array, accel: Array) -> bool:
     means = np.hstack([gyro, accel])[: cells * rows].reshape(cells, rows, 6).mean(axis=1)
     change = np.gradient(means[:, :3], rows * interval, axis=0)
     found = fit_turning(rows * interval, np.ascontiguousarray(np.hstack([change, means[:, 3:]]).T))
-    sizes = [abs(np.log(found.best_scale * unit)) for unit in (1.0, DEG)] if found.best_scale > 0.0 else [np.inf]
-    return bool(found.best_agreement >= AGREES and min(sizes) < ANGLE_SCALE)
+    if not found.best_scale > 0.0 or not found.best_agreement >= AGREES:
+        return False
+    away, unit = min((abs(np.log(found.best_scale * unit)), unit) for unit in (1.0, DEG))
+    turns = np.sort(np.ptp(means[:, :3], axis=0))[1] * unit
+    better = not as_rates > FAR_BETTER * found.best_agreement
+    return bool(away < ANGLE_SCALE and better and turns > LARGE_TURN)
 
 
 def _at_rest_part(data: Array, interval: float) -> Array:

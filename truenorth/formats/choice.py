@@ -16,7 +16,8 @@ from truenorth.formats.chosen import Choice, with_time
 from truenorth.formats.columns import Columns, listed, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import BLOCKS, Layout
-from truenorth.formats.names import Heading, families, heading_of, says_rates
+from truenorth.formats.names import Heading, families, heading_of, plain, says_rates
+from truenorth.formats.units import split
 from truenorth.formats.unnamed import by_behaviour
 from truenorth.records import COLUMNS, Guess
 from truenorth.records.imu import Kind
@@ -24,6 +25,7 @@ from truenorth.records.imu import Kind
 Array = NDArray[np.float64]
 
 CORE_MOTION = "accelerometer_acceleration"  # as apps write the field of that name, of Apple's framework
+IPHONE = re.compile(r"timestamp_since_reboot|^motion_|^gyro_rotation")  # other columns of SensorLog
 REFERENCE = re.compile(r"([^\[\]]+?)\s*\[\s*(\d+)\s*:\s*(\d+)\s*\]")
 
 
@@ -201,7 +203,7 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         if said is not None and kind == "rates" and parse_unit(said)[1] == DIMENSIONS["speed"][0]:
             kind = "increments"
         ours = COLUMNS[kind]
-        down = accels[0]["x"].family == CORE_MOTION
+        down = _points_down(columns, accels[0])
         signed = [f"-{name}" if down and k > 2 else name for k, name in enumerate(names)]
         why = "their names" + ("; an iPhone's accelerations point down at rest: their signs are turned" if down else "")
         guess = Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(ours, signed))})
@@ -214,6 +216,16 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
             guesses=[guess],
         )
     return None
+
+
+def _points_down(columns: Columns, axes: dict[str, Heading]) -> bool:
+    """Whether accelerations are as an iPhone's framework has them, in g and down at rest: so SensorLog writes them."""
+    if axes["x"].family != CORE_MOTION or not any(IPHONE.search(plain(split(name)[0])) for name in columns.names):
+        return False
+    if axes["x"].unit is not None:
+        return axes["x"].unit.casefold() == "g"
+    values = columns.read([axes[axis].name for axis in "xyz"], True)
+    return abs(gravity_level(values[np.isfinite(values).all(axis=1)]) - 1.0) < 0.2
 
 
 def _calibrated(sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:

@@ -12,7 +12,7 @@ from truenorth.core.errors import DataError
 from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
-from truenorth.formats.names import clock_of
+from truenorth.formats.names import clock_of, is_plain_clock
 from truenorth.records import Guess
 from truenorth.records.imu import Kind
 
@@ -74,6 +74,8 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     if columns.named and _of_two_columns(columns, names, choice):
         return choice
     steady = {name: scatter for name in clocks if (scatter := _scatter(columns, name)) is not None}
+    plainly = {name: scatter for name, scatter in steady.items() if is_plain_clock(name)}
+    steady = plainly or steady
     if steady:
         best = min(
             steady,

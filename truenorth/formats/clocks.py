@@ -28,6 +28,7 @@ FEWEST = 50  # rows, from which a log shows by itself what its numbers are
 BUNCHED = 1.2  # mean over median step, from which stamps are of a computer that read several rows at once
 BUNCH_SHARE = 0.05  # of the steps that are longer than 1.5 median ones, or zero; gaps are fewer
 TENTH_MS = "0.1 ms"
+FASTEST_FINE = 500.0  # Hz, of an Xsens's log
 SPAN = 0.02  # by which the stamps' span and that of a given rate may differ
 
 
@@ -92,7 +93,9 @@ def of_clock_face(raw: Array) -> Array:
 
 def _fine(raw: Array, source: str) -> str:
     """What a count of an Xsens's ``SampleTimeFine`` is: 0.1 ms of an MTi, 1 us of a DOT."""
-    readings = clock_readings(float(np.median(np.diff(raw))), float(raw[0]), (TENTH_MS, "us"))
+    step = float(np.median(np.diff(raw)))
+    slow = [unit for unit in (TENTH_MS, "us") if step * size(unit) * FASTEST_FINE >= 1.0]
+    readings = clock_readings(step, float(raw[0]), slow or (TENTH_MS, "us"))
     return take("unit of time", readings, [{"units": {"time": r.unit}} for r in readings], source, []).unit
 
 

@@ -118,7 +118,7 @@ def format_of(
     if (
         suffixes is SUFFIXES
         and given is None
-        and SENTENCE.match(head)
+        and _holds_sentences(head)
         and chosen in (None, "csv")
         and b"$VN" not in head
     ):
@@ -138,6 +138,12 @@ def format_of(
         raise DataError(f"{path.name}: holds {chosen} data; expected {what}: {', '.join(formats)}")
     _check_content(path.name, head, chosen, found)
     return chosen
+
+
+def _holds_sentences(head: bytes) -> bool:
+    """Whether a log begins with sentences of a receiver and most of its first lines are such: no table follows."""
+    lines = [line for line in head.splitlines() if line.strip()]
+    return SENTENCE.match(head) is not None and 2 * sum(SENTENCE.match(line) is not None for line in lines) > len(lines)
 
 
 def _check_content(source: str, head: bytes, chosen: str, found: str | None) -> None:

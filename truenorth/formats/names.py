@@ -43,6 +43,10 @@ CLOCK = re.compile(
     r"sampletimefine|datetime|date_?time|utc|elapsed|seconds_elapsed|timestamp_unix)"
     r"(?:_(?P<unit>s|ms|us|ns|secs?|msecs?|usecs?|nsecs?|seconds?|millis(?:econds)?|micros(?:econds)?|nanos(?:econds)?|since_?1970|since_?reboot))?"
 )
+BEFORE_CLOCK = re.compile(  # at the beginning: a prefix that is a word, and the number behind it
+    r"^(?:(?:imu|ins|sensors?|raw|body|data|device|output|inertial|combined|mems|fog|rlg|main|primary|scaled|"
+    r"shimmer(?:_(?=\w*\d)[0-9a-f]{1,4}(?=_)(?:_[a-f]{1,3}(?=_))?)?)\d*_)+"
+)
 TENTH_MS = ("sampletimefine", "sample_time_fine")  # of Xsens: counts of .1 ms
 
 
@@ -129,16 +133,23 @@ def clock_of(name: str) -> tuple[bool, str | None]:
         return True, "0.1 ms"
     if words in ("millis", "micros"):  # of Arduino
         return True, "ms" if words == "millis" else "us"
-    match = CLOCK.fullmatch(words) or CLOCK.fullmatch(BEFORE.sub("", words, count=1))
-    if match is None:
-        return False, None
+    match = CLOCK.fullmatch(words) or CLOCK.fullmatch(BEFORE_CLOCK.sub("", words, count=1))
     said = unit_in(unit) if unit else None
+    other = said is not None and parse_unit(said)[1] != DIMENSIONS["time"][0]
+    if match is None or (other and re.search("time|stamp", words) is None):  # ``T (degC)``
+        return False, None
     ending = match["unit"]
     if said is None and ending is not None and words not in ("seconds", "secs", "second", "sec"):
         said = unit_in(ending) if not ending.startswith("since") else None
     if said is not None and parse_unit(said)[1] != DIMENSIONS["time"][0]:
         said = None
     return True, said
+
+
+def is_plain_clock(name: str) -> bool:
+    """Whether a heading is a clock's without a word before it."""
+    words = BEHIND.sub("", plain(split(name)[0]))
+    return words in (*TENTH_MS, "millis", "micros") or CLOCK.fullmatch(words) is not None
 
 
 def says_rates(names: Sequence[str]) -> bool:

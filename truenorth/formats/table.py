@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from typing import Any
@@ -22,6 +23,7 @@ from truenorth.formats.behaviour import (
     gyro_facts,
     gyro_readings,
     is_usual,
+    size,
 )
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.choice import choose
@@ -31,6 +33,7 @@ from truenorth.formats.columns import Columns
 from truenorth.formats.counts import counts_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
+from truenorth.formats.names import heading_of, plain
 from truenorth.formats.repeats import without_repeats
 from truenorth.formats.turns import with_angles
 from truenorth.records import COLUMNS, Guess, ImuRecord
@@ -38,6 +41,9 @@ from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
+RATE = re.compile(r"rate|gyr|omega|vel|speed|dps|rad_s|deg_s|(?:^|_)w(?:_|[xyz]|$)|ω")
+ANGLE = re.compile(r"rot|ang|theta")
+AT_REST = 2e-3  # by which the specific force at rest in ug differs from gravity, with the sensors' errors
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
@@ -65,8 +71,8 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
         gyro, accel = gyro[kept], accel[kept]
     if columns.notes:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
-    said_above = counts_above(columns.above)
-    choice.units = {**choice.units, **said_above}
+    said_above = _said_above(columns, layout, choice, accel)
+    choice.units = {**said_above, **choice.units}
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
     kind, units = _units(time, gyro, accel, layout, choice, said_above, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
@@ -77,6 +83,15 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     return finish(
         time, gyro, accel, kind, layout, source, labels=choice.labels, place=columns.place, taken_for=tuple(guesses)
     )
+
+
+def _said_above(columns: Columns, layout: Layout, choice: Choice, accel: Array) -> dict[str, str]:
+    """Sizes of counts that lines above the table name: of what has no unit otherwise, and no gravity in m/s^2 or g as it is."""
+    found = {} if choice.documented else counts_above(columns.above)
+    counted = bool(np.all(accel[:JUDGED] == np.round(accel[:JUDGED])))
+    if not counted and accel_readings(gravity_level(accel), np.nan, ("rates",), ("m/s^2", "g")):
+        found.pop("accel", None)
+    return {key: unit for key, unit in found.items() if key not in choice.units and key not in layout.units}
 
 
 def _sensors(columns: Columns, layout: Layout, choice: Choice) -> tuple[Array, Array]:
@@ -166,7 +181,10 @@ def _units(
             raise DataError(f"{source}: {_no_gravity(level, accel, kinds[0], interval)}")
         options: list[dict[str, Any]] = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
         best = readings[0]
-        if not is_usual("accel", best.unit, best.kind):
+        exactly = (
+            best.unit == "ug" and abs(level * size("ug") / 9.80665 - 1.0) < AT_REST
+        )  # no other numbers are as large
+        if not is_usual("accel", best.unit, best.kind) and not exactly:
             usual = ("m/s^2", "g") if best.kind == "rates" else ("m/s",)
             options = [options[0], *({"units": {"accel": unit}} for unit in usual)]
             raise UnsureError(
@@ -178,11 +196,13 @@ def _units(
     assert kind is not None
     if "gyro" not in said:
         facts = gyro_facts(time, gyro, accel, kind)
-        if kind == "rates" and not facts.turned and are_angles(time, gyro, accel):
-            raise DataError(
+        asked = kind == "rates" and not facts.turned and _may_be_angles(choice.labels[1:4], layout)
+        if asked and are_angles(time, gyro, accel, facts.turning.best_agreement):
+            own = {"columns": dict(zip(COLUMNS["rates"], choice.labels[1:4]))}
+            raise UnsureError(
                 f"{source}: columns {', '.join(choice.labels[1:4])} turn gravity by what they change by, as angles do; expected "
-                "rates: name the columns of the gyros"
-            )
+                "rates: name the columns of the gyros", [own, {"units": {"gyro": "deg/s"}}, {"units": {"gyro": "rad/s"}}], guesses,
+            )  # fmt: skip
         readings = gyro_readings(facts, kind, said["accel"])
         if not readings:
             raise DataError(
@@ -193,6 +213,14 @@ def _units(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
+
+
+def _may_be_angles(names: Sequence[str], layout: Layout) -> bool:
+    """Whether neither the caller nor their names say that columns are rates: ``rotX``, ``theta_x`` and unknown ones."""
+    by_caller = "gyro" in layout.units or any(ours.startswith("gyro") for ours in layout.columns)
+    headings = [heading_of(name) for name in names]
+    rates = all(heading is not None and ANGLE.search(heading.family) is None for heading in headings)
+    return not by_caller and not rates and not any(RATE.search(plain(name)) for name in names)
 
 
 def _check_rare(

@@ -16,7 +16,7 @@ from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
 from truenorth.formats.names import plain
-from truenorth.formats.others import are_forces, is_other, quaternions
+from truenorth.formats.others import are_forces, is_doubtful, needs_a_question, others_of, quaternions
 from truenorth.formats.units import split, unit_in
 from truenorth.records import COLUMNS, Guess
 
@@ -44,29 +44,11 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
         choice = with_time(columns, layout, choice)
     skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
     free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
-    if columns.named:
-        free = [name for name in free if not is_other(name)]
-    turned = quaternions({name: numbers[name] for name in free})
-    free = [name for name in free if name not in turned]
-    free = [name for name in free if np.ptp(numbers[name]) > 0.0]  # what never changes, as a covariance, is no sensor
-    at = {name: 0 if columns.named else columns.names.index(name) - k for k, name in enumerate(free)}
-    groups = [list(names) for _, names in groupby(free, lambda name: (_variable(name), at[name]))]
-    blocks = [block for group in groups for block in _blocks(group)]
-    clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
-    interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
-    forces = [
-        block for block in blocks
-        if _constant(values := np.column_stack([numbers[name] for name in block]))
-        and any(
-            is_usual("accel", reading.unit, reading.kind)
-            for scale in (1.0, 1e-3, 1e-6, 1e-9, 1e-4)
-            for reading in accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
-        )
-    ]  # fmt: skip
-    blocks = [block for block in blocks if block in forces or not (columns.named and are_forces(block))]
-    alone = [pair for group in groups if (pair := _pair(group, blocks, forces))]
-    if len(alone) == 1:  # one variable is an IMU by itself, whatever the others are: attitude, for one
-        blocks, forces = alone[0]
+    left_out = others_of(free, [list(three.values()) for three in _threes(free).values()]) if columns.named else set()
+    blocks, forces = _sets(columns, choice, numbers, free, left_out, columns.named)
+    surely = {name for name in left_out if not is_doubtful(name)}
+    if surely < left_out and (not forces or len(blocks) < 2):  # names that may be those of sensors all the same
+        blocks, forces = _sets(columns, choice, numbers, free, surely)
     from truenorth.formats.sensor_folder import hint
 
     if longest >= 3 and forces and len(blocks) < 2:
@@ -90,11 +72,60 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
             + ", ".join(" ".join(block) for block in several), options, choice.guesses,
         )  # fmt: skip
     names = [*others[0], *forces[0]]
+    if left_out & set(forces[0]) and any("grav" in plain(name) for name in forces[0]):
+        raise UnsureError(
+            f"{source}: no other columns than {' '.join(forces[0])} show gravity, and they show nothing else by their names: name "
+            "the columns of the accelerometers",
+            [{"columns": {f"accel_{axis}": name for axis, name in zip("xyz", forces[0])}}], choice.guesses,
+        )  # fmt: skip
+    if left_out & set(others[0]) and needs_a_question(others[0], forces[0]):
+        raise UnsureError(
+            f"{source}: columns {' '.join(forces[0])} show gravity, and no other three may be gyros than {' '.join(others[0])}, "
+            "which by their names are no rates: name the columns of the gyros",
+            [{"columns": {f"gyro_{axis}": name for axis, name in zip("xyz", others[0])}}], choice.guesses,
+        )  # fmt: skip
     why = f"the norm of columns {' '.join(forces[0])} is gravity's; {' '.join(others[0])} are the three others"
     choice.sensors = [(name, 1.0) for name in names]
     choice.units = {**choice.units, **_units(names)}
     choice.guesses.append(Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(COLUMNS["rates"], names))}))
     return choice
+
+
+def _sets(
+    columns: Columns,
+    choice: Choice,
+    numbers: dict[str, Array],
+    names: list[str],
+    left_out: set[str],
+    strictly: bool = False,
+) -> tuple[list[list[str]], list[list[str]]]:
+    """Threes of columns that may be sensors, and those of them that show gravity."""
+    free = [name for name in names if name not in left_out]
+    turned = quaternions({name: numbers[name] for name in free})
+    free = [name for name in free if name not in turned]
+    at = {name: columns.names.index(name) - k for k, name in enumerate(free)}  # changes where a column is left out
+    groups = [list(part) for _, part in groupby(free, _variable)]
+    blocks = [block for group in groups for block in _blocks(group, at)]
+    clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
+    interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
+    forces = [
+        block for block in blocks
+        if _constant(values := np.column_stack([numbers[name] for name in block]))
+        and any(
+            is_usual("accel", reading.unit, reading.kind)
+            for scale in (1.0, 1e-3, 1e-6, 1e-9, 1e-4)
+            for reading in accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
+        )
+    ]  # fmt: skip
+    blocks = [block for block in blocks if block in forces or not (strictly and are_forces(block))]
+    still = [block for block in blocks if not any(np.ptp(numbers[name]) > 0.0 for name in block)]
+    forces = _without(still, forces)
+    others = _without(still, [block for block in blocks if block not in forces])
+    blocks = [block for block in blocks if block in forces or block in others]
+    alone = [pair for group in groups if (pair := _pair(group, blocks, forces))]
+    return (
+        alone[0] if len(alone) == 1 else (blocks, forces)
+    )  # one variable is an IMU by itself, whatever the others are
 
 
 def _units(names: list[str]) -> dict[str, str]:
@@ -108,22 +139,35 @@ def _units(names: list[str]) -> dict[str, str]:
     return result
 
 
-def _blocks(group: list[str]) -> list[list[str]]:
-    """Threes of columns: those whose names differ by x, y and z alone, in that order, and of the others each three in a row."""
-    axes: dict[str, dict[str, str]] = {}
-    for name in group:
-        for stem, axis in _of_axis(name):
-            axes.setdefault(stem, {}).setdefault(axis, name)
-    threes = {stem: three for stem, three in axes.items() if len(three) == 3}
+def _without(still: list[list[str]], blocks: list[list[str]]) -> list[list[str]]:
+    """The blocks that change, or all where none does: what never changes, as a covariance, is no sensor if there is another."""
+    return [block for block in blocks if block not in still] or blocks
+
+
+def _blocks(group: list[str], at: dict[str, int]) -> list[list[str]]:
+    """Threes of columns: those whose names differ by x, y and z alone, in that order, and of the others each three in a row.
+
+    A row ends where `at` changes: no column is missing inside a three.
+    """
+    threes = _threes(group)
     taken = {name: stem for stem, three in threes.items() for name in three.values()}
     blocks: list[list[str]] = []
-    for is_three, names in groupby(group, lambda name: name in taken):
+    for (is_three, _), names in groupby(group, lambda name: (name in taken, name not in taken and at[name])):
         run = list(names)
         if is_three:
             blocks += [[threes[stem][axis] for axis in "xyz"] for stem in dict.fromkeys(taken[name] for name in run)]
         else:
             blocks += [run[i : i + 3] for i in range(0, len(run) - 2, 3)]
     return [block for k, block in enumerate(blocks) if block not in blocks[:k]]
+
+
+def _threes(names: list[str]) -> dict[str, dict[str, str]]:
+    """Headings that differ by x, y and z alone: by what they have in common, and by axis."""
+    axes: dict[str, dict[str, str]] = {}
+    for name in names:
+        for stem, axis in _of_axis(name):
+            axes.setdefault(stem, {}).setdefault(axis, name)
+    return {stem: three for stem, three in axes.items() if len(three) == 3}
 
 
 def _of_axis(name: str) -> list[tuple[str, str]]:
