@@ -1,6 +1,7 @@
 """A level accelerometer that reads too much on a base that sways, and a sea that pushes a ship in step with her tilt."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from benchmarks.honesty import vehicles
 from benchmarks.honesty.foreign import sensed
 from tests.runs import some
 from truenorth.alignment import align, procedure, scale_on_sway
-from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
+from truenorth.alignment.put_right import likelihood
+from truenorth.alignment.scale_on_sway import _as_measured, scale_on_sway_evidence
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.position import Position
 from truenorth.records import ImuRecord
@@ -74,3 +76,19 @@ def test_a_tremble_that_rows_hardly_sample_says_nothing_of_a_scale_factor(freque
     gyro = np.outer(np.cos(2.0 * np.pi * frequency * t), [1e-3, 2e-3, 0.0])
     record = ImuRecord(t, gyro, np.tile([0.0, 0.0, 9.8], (len(t), 1)))
     assert scale_on_sway.hardly_sampled(record) is hardly
+
+
+@pytest.mark.parametrize("factor", [1.0 / 16.0, 0.8, 1.25])
+def test_a_motion_that_is_fitted_anew_makes_no_scale_factor_likelier(factor):
+    """A force that is all motion fits as well whatever its axis is multiplied by; a sound ship was refused for "+1500 %"."""
+    force = np.random.default_rng(5).normal(0.0, 0.02, 400)
+
+    def fitted(force):
+        density = -0.5 * np.sum(np.log(2.0 * np.pi * np.var(force)) + force**2 / np.var(force))
+        return SimpleNamespace(
+            estimates=SimpleNamespace(log_likelihood=density), integrals=SimpleNamespace(intervals=np.ones(len(force)))
+        )
+
+    given, put_right = fitted(force), fitted(factor * force)
+    assert abs(likelihood(put_right) - likelihood(given)) > 100.0
+    assert _as_measured(put_right, factor) == pytest.approx(likelihood(given))

@@ -51,9 +51,7 @@ def is_other(name: str) -> bool:
     words = plain(bare)
     if says_motion(name):
         return False
-    if _is_turned(name):
-        return True
-    if PART_OF_QUATERNION.search(words):
+    if _is_turned(name) or PART_OF_QUATERNION.search(words):
         return True
     if TURN_OR_FORCE.search(words):
         return False

@@ -181,9 +181,8 @@ def _units(
             raise DataError(f"{source}: {_no_gravity(level, accel, kinds[0], interval)}")
         options: list[dict[str, Any]] = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
         best = readings[0]
-        exactly = (
-            best.unit == "ug" and abs(level * size("ug") / 9.80665 - 1.0) < AT_REST
-        )  # no other numbers are as large
+        # No other numbers are as large.
+        exactly = best.unit == "ug" and abs(level * size("ug") / size("g") - 1.0) < AT_REST
         if not is_usual("accel", best.unit, best.kind) and not exactly:
             usual = ("m/s^2", "g") if best.kind == "rates" else ("m/s",)
             options = [options[0], *({"units": {"accel": unit}} for unit in usual)]
