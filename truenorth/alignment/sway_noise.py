@@ -6,8 +6,8 @@ without these. Velocity that wanders as ``t^(1/2)`` and ``g t^(3/2)`` is no moti
 
 So does a bias that changes: what it explains, by the quiet sensors' filter, is no sign of noise.
 
-White noise is as dense above the sway as under it. Where a sensor looks white there, and is as quiet as specified, what is slow and
-louder is a motion that the fit has missed: a ship at her moorings goes to and fro in many tones.
+White noise is as dense above the sway as under it. Where a sensor is as quiet as specified there, between the lines of an engine,
+too, what is slow and louder is a motion that the fit has missed: a ship at her moorings goes to and fro in many tones.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from truenorth.alignment.slow_sway import is_slow
 from truenorth.errors.staying import QUIETEST_BASE, StaticModel
 from truenorth.errors.sway import AxisMotion, with_motion
 from truenorth.estimate.staying import StayingLog
-from truenorth.filters import kalman
+from truenorth.filters import LinearSystem, kalman
 from truenorth.quality.density import noise_densities, noise_evidence
+from truenorth.quality.floor import FASTEST, white_floor
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -32,6 +33,7 @@ from truenorth.state.limits import limit
 # Of the random walks as specified: below, at and above those of another sensor
 FACTORS = tuple(k * limit("another sensor") for k in (0.5, 1.0, 2.0, 4.0, 8.0))
 SENSORS = ("accel", "gyro")
+NEAR_SWAY = 0.125  # of the highest frequency
 
 
 def louder_walks(noise: StaticModel, factors: Mapping[str, float]) -> StaticModel:
@@ -47,7 +49,7 @@ def is_louder(noise: StaticModel, usual: StaticModel) -> bool:
 
 
 def noisier_sensors(
-    log: StayingLog, motion: Sequence[AxisMotion], interval: float, begun: Callable[[], float]
+    log: StayingLog, motion: Sequence[AxisMotion], interval: float, begun: Callable[[LinearSystem], float]
 ) -> dict[str, float]:
     """How many times noisier than specified a sensor is, where the log rules out less than ``limit("another sensor")`` times.
 
@@ -60,7 +62,8 @@ def noisier_sensors(
     interval : float, s
         Of the filter.
     begun : callable
-        Twice the logarithm of the likelihood ratio by which quiet sensors with a bias that changes explain the log better.
+        Twice the logarithm of the likelihood ratio by which a bias that changes explains the log better, of a system with the
+        noise and the motion of sensors that are quiet.
     """
     seen = _loud_above_sway(log)
     duration = float(log.integrals.time[-1])
@@ -71,42 +74,53 @@ def noisier_sensors(
     if all(axis == other for axis, other in zip(motion, steady, strict=True)):
         return {}  # no motion that noise could hide in
 
-    def likelihood(sensor: str, factor: float) -> float:
-        """Twice its logarithm, of the better of both motions."""
+    def tried(sensor: str, factor: float) -> tuple[float, LinearSystem]:
+        """Twice the logarithm of the likelihood, of the better of both motions, and the system with that."""
         other = copy.copy(log)
         other.noise = louder_walks(log.noise, {sensor: factor})
         system = other.linearise()
         both = (motion,) if factor == 1.0 else (motion, steady)
-        systems = (with_motion(system, interval, m, spare=False) for m in both)
-        return max(2.0 * float(kalman(item).log_likelihood) for item in systems)
+        systems = [with_motion(system, interval, m, spare=False) for m in both]
+        found = [2.0 * float(kalman(item).log_likelihood) for item in systems]
+        best = int(np.argmax(found))
+        return found[best], systems[best]
+
+    def explained(quiet: tuple[float, LinearSystem]) -> float:
+        return quiet[0] + begun(quiet[1])
 
     suspects = [sensor for sensor in SENSORS if seen[sensor] * limit("one noise") >= limit("another sensor")]
     if not suspects:
         return {}
-    as_said = likelihood(SENSORS[0], 1.0)
+    as_said = tried(SENSORS[0], 1.0)
     found = {}
     for sensor in suspects:
-        below = max(as_said, likelihood(sensor, FACTORS[0]))
+        scattered = tried(sensor, FACTORS[0])  # as sensors of one datasheet do
         factor = FACTORS[1]
-        best = likelihood(sensor, factor)
-        if best - below <= limit("drift"):
+        best, _ = tried(sensor, factor)
+        if best - max(as_said[0], scattered[0]) <= limit("drift"):
             continue
         for more in FACTORS[2:]:
-            better = likelihood(sensor, more)
+            better, _ = tried(sensor, more)
             if better < best:
                 break
             best, factor = better, more
-        if best - below > begun():
+        if best > max(explained(as_said), explained(scattered)):
             found[sensor] = factor
     return found
 
 
 def _loud_above_sway(log: StayingLog) -> dict[str, float]:
-    """How many times louder than specified each sensor is above the sway; infinite where it does not look white there."""
+    """How many times louder than specified each sensor is above the sway; infinite where too few rows show it.
+
+    Of channels that do not look white there, by the floor between the lines of what shakes them: near the sway, since above it a
+    filter in the device may take noise away, and rounding adds to it.
+    """
     _, density = noise_densities(log.record)
-    if not np.isfinite(density).any(axis=0).all():
-        return dict.fromkeys(SENSORS, math.inf)
-    usual = np.nanmedian(density, axis=0)
+    if np.isfinite(density).any(axis=0).all():
+        usual = np.nanmedian(density, axis=0)
+    else:
+        near, all_through = (white_floor(log.record, fastest) for fastest in (NEAR_SWAY, FASTEST))
+        usual = np.nan_to_num(np.where(np.isfinite(near), near, all_through), nan=math.inf)
     said = asdict(log.noise)
     channels = {"gyro": slice(0, 3), "accel": slice(3, 6)}
     return {

@@ -36,7 +36,8 @@ from truenorth.errors.staying import PHI
 from truenorth.errors.sway import AxisMotion
 from truenorth.estimate.batch import settle
 from truenorth.estimate.staying import Prior, StayingLog, prior_of
-from truenorth.filters import LinearSystem
+from truenorth.filters import LinearSystem, kalman
+from truenorth.filters.gains import filter_gains
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, integrate
@@ -93,7 +94,7 @@ class SwayAlignment(FineAlignment):
     @cached_property
     def noisier(self) -> Mapping[str, float]:
         """Times its specification, by sensor."""
-        return noisier_sensors(self.about, self.motion, self.estimator.interval, partial(best_bias, self))
+        return noisier_sensors(self.about, self.motion, self.estimator.interval, self._bias_of)
 
     @cached_property
     def late(self) -> Array:
@@ -104,6 +105,11 @@ class SwayAlignment(FineAlignment):
     def heave(self) -> Heave | None:
         """Of a base that is one with the IMU."""
         return _heave(self.about) if self.about.C_sb is None else None
+
+    def _bias_of(self, system: LinearSystem) -> float:
+        """:func:`best_bias` of the log by another system."""
+        estimates = kalman(system, history="full")
+        return best_bias(replace(self, system=system, estimates=estimates, gains=filter_gains(system, estimates)))
 
     def suspect(self) -> bool:
         """Whether something seems to have begun within the log, or a sensor to be noisier than specified."""

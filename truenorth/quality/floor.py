@@ -28,14 +28,21 @@ QUARTER = 0.25
 HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)
 
 
-def white_floor(record: ImuRecord) -> Array:
-    """(6,) random walk of each channel, rad/sqrt(s) and m/s/sqrt(s), by the floor of its spectrum; NaN of too short a record."""
+def white_floor(record: ImuRecord, fastest: float = FASTEST) -> Array:
+    """(6,) random walk of each channel, rad/sqrt(s) and m/s/sqrt(s), by the floor of its spectrum; NaN of too short a record.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    fastest : float
+        Of its highest frequency: where the band ends.
+    """
     rows = round(WINDOW / record.interval)
     count = len(record) // rows
     if count < FEWEST or record.gaps.size:  # of rows that are nanoseconds apart a window would fill the memory
         return np.full(6, np.nan)
     frequency = np.arange(rows // 2 + 1) / (rows * record.interval)
-    band = (frequency >= SLOWEST) & (frequency <= FASTEST * frequency[-1])
+    band = (frequency >= SLOWEST) & (frequency <= fastest * frequency[-1])
     if np.count_nonzero(band) < FEWEST:
         return np.full(6, np.nan)
     phase = 2.0 * math.pi * (np.arange(rows) + 0.5) / rows
