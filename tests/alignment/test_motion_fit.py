@@ -141,6 +141,11 @@ def cubic_system(z):
     )
 
 
+@pytest.mark.parametrize("count", [8, 400])
+def test_a_base_that_does_not_move_at_all_has_no_oscillator(count):
+    assert search(Series(np.zeros(count), 1.0, WALKS), MOST_OSCILLATORS[0]).oscillators == ()
+
+
 def test_windowed_fits_find_the_states_next_to_a_tone():
     t = np.arange(1.0, 301.0)
     truth = np.array([1.0, -0.02, 1e-4])

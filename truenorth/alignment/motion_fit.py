@@ -50,6 +50,8 @@ def search(series: Series, most: int, start: AxisMotion | None = None) -> AxisMo
     """One oscillator after the other, as long as the criterion falls; from nothing, or besides those of a good guess."""
     white = AxisMotion(max(float(np.std(series.detrended)), QUIETEST))
     best = climb(series, white if start is None else start, POLISHES)
+    if not series.periodogram[LOWEST_BIN:].any():  # nothing moves: no peak to begin from
+        return best
     score = series.score(best)
     for count in range(len(best.oscillators) + 1, most + 1):
         chosen = climb(series, min(_candidates(series, best, count), key=series.score), POLISHES)
