@@ -98,7 +98,7 @@ SENTENCES = {
         "({imu:imu}) allows {allowed:deg/h|} deg/h: a miss of that size towards east is in sigma"
     ),
     "force.misses": (
-        "the mean specific force misses gravity by {residual:ug|.0f} ug, where the specification ({imu:imu}) allows "
+        "the mean specific force misses gravity by {residual:ug|} ug, where the specification ({imu:imu}) allows "
         "{allowed:ug|} ug"
     ),
     "table.touched": (
