@@ -24,7 +24,8 @@ from truenorth.alignment.answer import answer_of
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.coarse_sensors import calibrated, matrix_evidence
-from truenorth.alignment.encoder_angles import angles_at, carried_angles
+from truenorth.alignment.encoder_angles import CarriedAngles, angles_at, carried_angles
+from truenorth.alignment.encoder_turns import base_turns
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
 from truenorth.alignment.late_gyro import late_gyro_evidence
@@ -47,8 +48,10 @@ from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
 from truenorth.errors.staying import StaticModel
 from truenorth.quality.codes import codes_evidence
-from truenorth.quality.encoder import encoder_evidence, zero_evidence
+from truenorth.quality.encoder import encoder_evidence
+from truenorth.quality.encoder_errors import error_evidence
 from truenorth.quality.encoder_jumps import jump_evidence
+from truenorth.quality.encoder_slips import slip_of
 from truenorth.quality.hum import hum_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
@@ -182,7 +185,7 @@ def align_rotary(
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
     evidence = _of_encoder(start, encoder, axes, task, spec)
-    evidence += [] if encoder is None else jump_evidence(carried.time, carried.by_gyros, carried.turned, carried.steps)
+    evidence += [] if encoder is None else _of_angles(fine, record, carried, axes, task, spec, angle_sigma)
     evidence += _of_filter(answer, fine, spec, task, given=given is not None)
     if isinstance(fine, SwayAlignment):
         anew = aligned_anew(fine, start, mount, _turned(spec))
@@ -239,11 +242,31 @@ def _of_encoder(
     found += record_evidence(record, task.motion, given, imu=spec, right=start.right_record())
     found += matrix_evidence(start, spec)
     found += codes_evidence(record, task.position.lat) + hum_evidence(record, task.position.lat, spec)
-    if len(axes) == 2:
-        outer, inner = np.abs(np.diff(np.unwrap(encoder.angles, axis=0)[[0, -1]], axis=0)[0])
-        times = outer / inner if inner > 2.0 * math.pi else 1.0  # of what comes back a delay is no zero
-        found += zero_evidence(record, given, _inner(encoder, axes), times)
     return found + notes(encoder.notes)
+
+
+def _of_angles(
+    fine: FineAlignment,
+    record: ImuRecord,
+    carried: CarriedAngles,
+    axes: Sequence[str],
+    task: Task,
+    spec: ImuSpec,
+    angle_sigma: float,
+) -> list[Evidence]:
+    """Errors of the encoder's angles, by the gyros and by how the base turns."""
+    found = jump_evidence(carried.time, carried.by_gyros, carried.turned, carried.steps)
+    turns = base_turns(fine, record, carried, axes, task.position.lat, spec)
+    if turns is None:
+        return found
+    slip = slip_of(turns)
+    if slip is not None and not found:
+        found.append(slip.evidence())
+    times = 1.0
+    if len(axes) == 2:
+        outer, inner = np.abs(turns.angles[-1] - turns.angles[0])
+        times = outer / inner if inner > 2.0 * math.pi else 1.0  # of what comes back a delay is no zero
+    return found + error_evidence(turns, None if slip is None else slip.turns, times, angle_sigma)
 
 
 def _arm_velocity(
@@ -267,12 +290,6 @@ def _orders(count: int) -> dict[str, Array]:
 def _reading(encoder: EncoderRecord, axes: Sequence[str], order: Array) -> Callable[[Array], Array]:
     """``C_sb`` (K, 3, 3) at times, by the angles in an order."""
     return lambda time: np.swapaxes(C_bs_from_angles(axes, angles_at(encoder, time, axes) @ order.T), -1, -2)
-
-
-def _inner(encoder: EncoderRecord, axes: Sequence[str]) -> Callable[[Array], Array]:
-    """Direction (K, 3) of the inner axis in the body at times."""
-    e = np.eye(3)["xyz".index(axes[1])]
-    return lambda time: C_bs_from_angles(axes[:1], angles_at(encoder, time, axes)[:, :1]) @ e
 
 
 def angles_from_gyros(

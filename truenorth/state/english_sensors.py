@@ -164,6 +164,18 @@ OF_SENSORS = {
         "angle {axis} of the encoder jumps by {size:deg|+.3f} deg at {time:.1f} s, where the gyros see no turn of that axis: it "
         "slips, or its count was set anew"
     ),
+    "encoder.slips": (
+        "angle {axis} of the encoder slips by {size:deg|+.3f} ± {sigma:deg|.3f} deg near {time:.1f} s: from there on the base "
+        "would stand turned about that axis"
+    ),
+    "encoder.disc": (
+        "angle {axis} of the encoder is off by {size:deg|.3f} ± {sigma:deg|.3f} deg to and fro, once a turn, as of a disc out of "
+        "centre: the base would wobble as the axis turns"
+    ),
+    "encoder.disc_twice": (
+        "angle {axis} of the encoder is off by {size:deg|.3f} ± {sigma:deg|.3f} deg to and fro, twice a turn: the base would "
+        "wobble as the axis turns"
+    ),
     "encoder.zero": (
         "the zero of the inner axis' angle is off by {off:deg|+.3f} ± {sigma:deg|.3f} deg, or the encoder is late or early: the "
         "base would wobble as the outer axis turns"

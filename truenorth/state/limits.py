@@ -99,14 +99,28 @@ LIMITS: dict[str, Limit] = {
     "indexer": Limit(
         7.0,
         "sigma",
-        "of a wobble of the zero of an indexer's angles: sway is alike from turn to turn, which sigma does not know",
+        "of a zero or a disc of an indexer's encoder: sway is alike from turn to turn, which sigma does not know",
     ),
     "jump of an encoder": Limit(
         12.0,
         "sigma of a row's noise",
         "a thousandth of that of 48 h at 100 Hz by chance, were it normal; starts and stops of an axis have longer tails",
     ),
-    "few turns": Limit(2e-4, "1", "false alarms of a sound indexer, of whose few turns that sigma is estimated"),
+    "slip of an encoder": Limit(
+        10.0,
+        "sigma",
+        "of innovations that are not quite normal: sound logs, simulated and of ships in a sea of their own, have 6 to 11",
+    ),
+    "swing with the axes": Limit(
+        2e-3,
+        "1",
+        "probability that a base, which swings as fast as an indexer turns, does so by as much more about the one axis by chance",
+    ),
+    "hint of an encoder's error": Limit(
+        3.5,
+        "sigma",
+        "of the same noise as the limit of an indexer: chance gives it in 1e-3 of logs, and its size is in sigma",
+    ),
     "start at rest": Limit(
         8.0,
         "sigma",

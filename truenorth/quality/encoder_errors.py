@@ -1,0 +1,382 @@
+"""Errors of an indexer's encoder, by how the base turns with its angles: zero, discs out of centre, slips.
+
+With the IMU's attitude by its gyros and the encoder's angles the base turns by ``r(t) = sway - u_o e_o - u_i e_i`` about its mean
+attitude, ``u`` the directions of the axes in the base and ``e`` what their angles are off by: a zero (that of the inner angle; that
+of the outer one defines the body's axes), once and twice a turn ``c cos(n a) + s sin(n a)``, and steps. All are fitted at once by
+generalised least squares. The sway is what an autoregression of each axis' turns predicts: its innovations are white, and they are
+what is fitted. What is left of errors of the gyros, of the mounting and of the clock is fitted too, as large as it may be.
+
+An autoregression may take an error for sway that is as regular: it is that of what is left without the errors, as they are known
+from pass to pass, and allows for a noise about as large as what is left of them. Sway may go with the axes for a while. So an error
+of the angles has to stand out against patterns by which no such error turns the base: as fast, but mirrored or about other axes,
+and nearly as fast, about the same ones. It has to do so with longer and shorter autoregressions, and against a line of the sway
+that is nearly as fast.
+
+Source: G. Jenkins, D. Watts, Spectral Analysis and its Applications, Holden-Day, 1968 (generalised least squares by whitening).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.analysis.student import student_limit
+from truenorth.quality.encoder import USUAL_ZERO
+from truenorth.quality.prediction import Whitener, prediction
+from truenorth.state.evidence import Effect, Evidence, Figure, Kind
+from truenorth.state.limits import limit
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ORDERS = (30, 15)  # of autoregressions
+FEWEST = 6  # samples for each of an order
+SHORTEST = 40  # samples that show anything
+CELL = 1.0  # s from sample to sample for what goes with the angles
+FASTEST = 0.7  # rad by which an axis turns from sample to sample: twice as much is sampled well enough
+HARMONICS = (1, 2)
+NEARER = tuple(0.25 * k for k in range(-12, 13) if abs(k) > 1)  # the same, of a line
+DETUNED = (-3, -2, -1, 1, 2, 3)  # turns more in the whole log, of patterns nearly as fast
+PRODUCTS = (
+    1.0  # times what products of the sway show of an outer axis' pattern, a line as its own is: an error is larger
+)
+UNSURE = 0.99  # of the limit of an error
+LINE = 0.3  # of an error's size, from which a line of the sway may have made it
+OWN = 0.2  # of the energy of a pattern, which the fit leaves of it, from which it is one of its own
+UNKNOWN = math.radians(10.0)  # rad, one sigma: of what is looked for
+MOUNTED = math.radians(1.0)  # rad, one sigma: of axes and of the IMU's mounting
+LATE = 1.0  # s, one sigma: of the encoder's clock
+STEADY = 0.05  # of its largest rate, by which that of an axis changes: a delay is a zero there
+MOST_GONE = 40  # samples in gaps
+# rad, of white noise that the autoregressions of the passes allow for: a line no higher, left over from an error, is no sway
+NOISES = (1.7e-4, 3.5e-5, 0.9e-5)
+
+
+@dataclass(frozen=True)
+class Turns:
+    """How the base turns about its mean attitude, at even times.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+    turn : (K, 3) array, rad
+        Rotation vector from the mean attitude, its axes.
+    there : (K,) bool array
+        Whether the encoder has a row there.
+    angles : (K, A) array, rad
+    C_bs : (K, 3, 3) array
+        Attitude of the IMU in the base.
+    directions : tuple of A (K, 3) arrays
+        Of the axes in the base, the outermost first.
+    gyro : (K, 3, m) array
+        By what errors of the gyros turn the base.
+    gyro_sigma : (m,) array
+        Their one-sigmas.
+    up : (3,) array
+        The vertical in the base, in the mean.
+    """
+
+    time: Array
+    turn: Array
+    there: Mask
+    angles: Array
+    C_bs: Array
+    directions: tuple[Array, ...]
+    gyro: Array
+    gyro_sigma: Array
+    up: Array
+
+    @property
+    def step(self) -> float:
+        """Between the times, s."""
+        return float(self.time[1] - self.time[0])
+
+    def thinned(self, cell: float) -> Turns:
+        """Those of times about `cell` s apart."""
+        every = max(1, round(cell / self.step))
+        rows = slice((len(self.time) - 1) % every, None, every)  # the last one is there
+        return replace(
+            self,
+            time=self.time[rows],
+            turn=self.turn[rows],
+            there=self.there[rows],
+            angles=self.angles[rows],
+            C_bs=self.C_bs[rows],
+            directions=tuple(u[rows] for u in self.directions),
+            gyro=self.gyro[rows],
+        )
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Generalised least squares of the base's turns."""
+
+    turns: Turns
+    white: Whitener
+    sway: Array  # (K, 3) rad: turns, less what is fitted
+    left: Array  # (N, 3) whitened
+    columns: Array  # (N, 3, m) whitened
+    C: Array  # (m, m) covariance
+    found: Array  # (m,)
+    groups: dict[str, slice]  # of the columns: what is looked for
+
+    def group(self, name: str) -> tuple[Array, Array]:
+        """What is found of a group, and its covariance."""
+        part = self.groups[name]
+        return self.found[part], self.C[part, part]
+
+    def ratio(self, name: str) -> float:
+        """Chi-square of a group by its degrees of freedom."""
+        x, P = self.group(name)
+        return float(x @ np.linalg.pinv(P, hermitian=True) @ x) / len(x)
+
+    def gains(self, patterns: Array) -> tuple[Array, Array]:
+        """Of other patterns (K, 3, n) the part that is their own, and the chi-square that each would explain, one degree each."""
+        w = self.white(patterns).reshape(self.left.size, -1)
+        X = self.columns.reshape(self.left.size, -1)
+        both, energy = X.T @ w, np.sum(w**2, axis=0)
+        own = energy - np.sum(both * (self.C @ both), axis=0)
+        chi = (self.left.ravel() @ w) ** 2 / np.maximum(own, 1e-12 * energy + 1e-300)
+        return own / np.maximum(energy, 1e-300), chi
+
+
+def looks(turns: Turns) -> bool:
+    """Whether there are samples enough, and few gaps."""
+    return len(turns.time) >= SHORTEST and int(np.count_nonzero(~turns.there)) <= MOST_GONE
+
+
+def fitted(
+    turns: Turns,
+    order: int,
+    more: Array | None = None,
+    noises: Sequence[float] = NOISES,
+    white: Whitener | None = None,
+) -> Fit:
+    """A fit, its autoregressions those of what it leaves.
+
+    Parameters
+    ----------
+    turns : Turns
+    order : int
+        Of the autoregressions, in a log that is long enough.
+    noises : sequence of float, rad
+        That the autoregressions of the passes allow for.
+    white : Whitener, optional
+        Those to take, as they are.
+    more : (K, 3, n) array, optional
+        Columns to fit besides, group ``more``.
+    """
+    nuisance, sigma = _nuisance(turns)
+    named = dict(_patterns(turns)) | ({} if more is None else {"more": more})
+    gone = np.flatnonzero(~turns.there)
+    missing = np.zeros((len(turns.time), 3, 3 * gone.size))
+    for i, row in enumerate(gone):
+        missing[row, :, 3 * i : 3 * i + 3] = np.eye(3)
+    X = np.concatenate([nuisance, *named.values(), missing], axis=2)
+    groups, first = {}, nuisance.shape[2]
+    for name, columns in named.items():
+        groups[name] = slice(first, first + columns.shape[2])
+        first += columns.shape[2]
+    weight = np.concatenate([sigma, np.full(X.shape[2] - len(sigma), UNKNOWN)]) ** -2.0
+    r = _bridged(turns)
+    base = X[:, :, :6]
+    start = np.concatenate([base, X[:, :, len(sigma) : first]], axis=2)
+    # Weighted by a bell, that sway, however large, does not leak into what is slower.
+    seen = (start * _bell(turns)[:, None, None]).reshape(-1, start.shape[2])
+    left = r - start @ np.linalg.lstsq(seen, (r * _bell(turns)[:, None]).ravel(), rcond=None)[0]
+    given, order = white, min(order, len(turns.time) // FEWEST)
+    for noise in noises if given is None else noises[:1]:
+        white = given or prediction(left, turns.there, order, noise)
+        y, W = white(r).ravel(), white(X).reshape(-1, X.shape[2])
+        scale = np.sqrt(np.sum(W**2, axis=0) + weight)
+        M = (W / scale).T @ (W / scale) + np.diag(weight / scale**2)
+        C = np.linalg.pinv(M, rcond=1e-13, hermitian=True) / np.outer(scale, scale)
+        found = C @ (W.T @ y)
+        left = r - X @ found
+    assert white is not None
+    return Fit(turns, white, left, (y - W @ found).reshape(-1, 3), W.reshape(-1, 3, X.shape[2]), C, found, groups)
+
+
+def _bell(turns: Turns) -> Array:
+    """(K,) weights that fade at both ends, zero where there is no row."""
+    K = len(turns.time)
+    return np.where(turns.there, np.sin(math.pi * (np.arange(K) + 0.5) / K) ** 4, 0.0)
+
+
+def _bridged(turns: Turns) -> Array:
+    """(K, 3) turns with straight lines where there is no row: their columns take up what these miss."""
+    seen = turns.there
+    return np.stack([np.interp(turns.time, turns.time[seen], x[seen]) for x in turns.turn.T], axis=-1)
+
+
+def _nuisance(turns: Turns) -> tuple[Array, Array]:
+    """(K, 3, m) what turns the base and is no error of its angles, and one-sigmas (m,); six of them are never small."""
+    K = len(turns.time)
+    slow = np.linspace(-1.0, 1.0, K)[:, None, None] * np.eye(3)
+    columns = [np.broadcast_to(np.eye(3), (K, 3, 3)), slow, turns.gyro]
+    sigma = [np.full(6, math.pi), turns.gyro_sigma]
+    inner = turns.directions[-1]
+    seen = np.abs(np.einsum("kij,ki->kj", turns.C_bs, inner)[0])
+    tilted = turns.C_bs[:, :, seen < 0.5]  # about the IMU's axes across the inner one
+    if len(turns.directions) > 1:
+        tilted = np.concatenate([tilted, np.cross(turns.directions[0], inner)[:, :, None]], axis=2)
+    columns.append(tilted)
+    sigma.append(np.full(tilted.shape[2], MOUNTED))
+    rates = np.gradient(turns.angles, turns.step, axis=0)
+    if np.max(np.std(rates, axis=0)) > STEADY * np.max(np.abs(rates)):
+        late = sum(u * rate[:, None] for u, rate in zip(turns.directions, rates.T, strict=True))
+        columns.append(np.asarray(late)[:, :, None])
+        sigma.append(np.array([LATE]))
+    return np.concatenate(columns, axis=2), np.concatenate(sigma)
+
+
+def _waves(direction: Array, phase: Array) -> Array:
+    """(K, 3, 2) cosine and sine of a phase (K,) about a direction (K, 3)."""
+    return np.stack([direction * np.cos(phase)[:, None], direction * np.sin(phase)[:, None]], axis=2)
+
+
+def _patterns(turns: Turns) -> Iterator[tuple[str, Array]]:
+    """By what errors of the angles turn the base, by name: ``zero``, and ``1.2`` for the first axis twice a turn."""
+    if len(turns.directions) > 1:
+        yield "zero", turns.directions[-1][:, :, None]
+    for axis, u in enumerate(turns.directions):
+        for n in HARMONICS:
+            yield f"{axis + 1}.{n}", _waves(u, n * turns.angles[:, axis])
+
+
+def _unlike(turns: Turns, name: str, detuned: Sequence[float] = DETUNED) -> tuple[list[Array], list[Array]]:
+    """Patterns by which no error of the angles turns the base, by families: as fast as that of a name, and nearly as fast."""
+    outer, share = turns.directions[0], 2.0 * math.pi * np.linspace(0.0, 1.0, len(turns.time))
+    a = turns.angles[:, 0]
+    across = np.cross(outer, np.eye(3)[int(np.argmin(np.abs(outer[0])))])
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    if name.startswith("1"):
+        n = int(name[-1])
+        same = [_waves(v, n * a) for v in (across, np.cross(outer, across))]
+        return same, [_waves(outer, n * a + k * share) for k in detuned]
+    u, quarter = turns.directions[1], np.cross(outer, turns.directions[1])
+
+    def turned(by: Array) -> Array:
+        c, s = np.cos(by)[:, None], np.sin(by)[:, None]
+        pair = np.stack([c * u + s * quarter, c * quarter - s * u], axis=2)
+        if name == "zero":
+            return pair
+        b = int(name[-1]) * turns.angles[:, 1]
+        return np.concatenate([pair * np.cos(b)[:, None, None], pair * np.sin(b)[:, None, None]], axis=2)
+
+    still = np.zeros(len(a))
+    same = [turned(still)[:, :, 1::2], turned(-2.0 * a)]
+    return same, [turned(way + k * share) for way in (still, -2.0 * a) for k in detuned]
+
+
+def _shown(turns: Turns, x: Array, pattern: Array) -> float:
+    """Amplitude, rad, of a pattern (K, 3, n) in a motion (K, 3), both weighted by a bell."""
+    bell = _bell(turns)[:, None]
+    x = (x - np.sum(x * bell, axis=0) / np.sum(bell)) * bell
+    w = (pattern * bell[:, :, None]).reshape(x.size, -1)
+    return float(np.linalg.norm(w.T @ x.ravel() / np.sum(w**2, axis=0)))
+
+
+def _line(fit: Fit, name: str) -> tuple[Array, float]:
+    """(K, 3, n) the pattern nearly as fast as that of a name that the sway shows most of, and its amplitude there, rad."""
+    patterns = _unlike(fit.turns, name, NEARER)[1]
+    return max(((each, _shown(fit.turns, fit.sway, each)) for each in patterns), key=lambda item: item[1])
+
+
+def _by_products(turns: Turns, pattern: Array) -> float:
+    """Amplitude, rad, of a pattern in what turns about two axes make about a third, by their products: lines of their own."""
+    x = turns.turn
+    products = (x[:, i] * x[:, j] for i in range(3) for j in range(i, 3))
+    return max(_shown(turns, product[:, None] * axis, pattern) for product in products for axis in np.eye(3))
+
+
+def beyond_chance(fit: Fit, name: str) -> float:
+    """By how much a group stands out, in units of what chance and a sway that goes with the axes allow: above one it is there."""
+    ratio, size = fit.ratio(name), fit.groups[name].stop - fit.groups[name].start
+    noise = 1.0
+    for i, patterns in enumerate(_unlike(fit.turns, name)):
+        own, chi = fit.gains(np.concatenate(patterns, axis=2))
+        chi = chi[own > OWN]
+        if not chi.size:
+            continue
+        mean, dof = float(np.mean(chi)), len(chi)
+        allowed = (
+            limit("indexer") ** 2 * max(1.0, mean) if i else f_limit(limit("swing with the axes"), size, dof) * mean
+        )
+        noise = max(noise, allowed)
+    return ratio / max(noise, limit("indexer") ** 2)
+
+
+def f_limit(chance: float, first: int, second: int) -> float:
+    """What the ratio of two chi-squares, by their degrees of freedom (one or two, any), exceeds with the given probability."""
+    if first == 1:
+        return student_limit(chance, second) ** 2
+    return float((chance ** (-2.0 / second) - 1.0) * second / 2.0)
+
+
+def errors_of(turns: Turns, slip: Callable[[Turns], Array] | None = None) -> dict[str, tuple[Fit, float]]:
+    """By the name of what stands out the fit that shows it, and by how much it is beyond chance."""
+    turns = turns.thinned(
+        min(CELL, FASTEST / max(float(np.max(np.abs(np.gradient(turns.angles, turns.step, axis=0)))), 1e-6))
+    )
+    if not looks(turns):
+        return {}
+    more = None if slip is None else slip(turns)
+    fits = [fitted(turns, order, more) for order in ORDERS]
+    hint = (limit("hint of an encoder's error") / limit("indexer")) ** 2
+    found = {}
+    for name, pattern in _patterns(turns):
+        beyond = min(beyond_chance(fit, name) for fit in fits)
+        by_products = PRODUCTS * _by_products(turns, pattern) if name.startswith("1") else 0.0
+        if beyond <= hint or np.linalg.norm(fits[0].group(name)[0]) < by_products:
+            continue
+        fit, (line, amplitude) = fits[0], _line(fits[0], name)
+        size = float(np.linalg.norm(fit.group(name)[0]))
+        if amplitude > LINE * size:
+            besides = line if more is None else np.concatenate([more, line], axis=2)
+            fit, *others = (fitted(turns, order, besides) for order in ORDERS)
+            beyond = min(beyond, *(beyond_chance(each, name) for each in (fit, *others)))
+        if beyond > hint:  # below all that the base sways by about as fast it is a hint, however clear
+            found[name] = fit, beyond if size > amplitude else min(beyond, UNSURE)
+    return found
+
+
+def error_evidence(
+    turns: Turns, slip: Callable[[Turns], Array] | None = None, times: float = 1.0, said: float = 0.0
+) -> list[Evidence]:
+    """Zero and discs of an encoder that stand out.
+
+    Between the limits of a hint and of an error chance may have shown one: its size is in sigma then.
+
+    Parameters
+    ----------
+    turns : Turns
+    slip : callable, optional
+        By what a slip that was found turns the base (K, 3, 1), at the times of some turns.
+    times : float
+        By which the outer axis turns faster than the inner one: an encoder that is late turns heading by so many times a zero.
+    said : float, rad
+        One sigma that was said of the angles: an error of that size is in sigma already.
+    """
+    found = []
+    for name, (fit, beyond) in errors_of(turns, slip).items():
+        x, P = fit.group(name)
+        size, sigma = float(np.linalg.norm(x)), math.sqrt(float(np.trace(P)) / len(x))
+        if size < limit("by chance") * said:
+            continue
+        kind: Kind = "hint" if beyond < 1.0 else "bounded" if size > USUAL_ZERO else "known"
+        if name == "zero":
+            figures: dict[str, Figure] = {"off": -float(x[0]), "sigma": sigma}
+            found.append(Evidence("encoder.zero", figures, kind, Effect(max(1.0, times) * size, size), ("encoder",)))
+            continue
+        axis = int(name[0]) - 1
+        tilted = math.sqrt(max(1.0 - float(np.mean(turns.directions[axis] @ turns.up)) ** 2, 0.0)) if axis == 0 else 1.0
+        sways = float(np.max(np.linalg.norm(turns.turn, axis=1)))
+        key = "encoder.disc" if name.endswith("1") else "encoder.disc_twice"
+        figures = {"axis": str(axis + 1), "size": size, "sigma": sigma}
+        found.append(Evidence(key, figures, kind, Effect(size, min(tilted + sways, 1.0) * size), ("encoder",)))
+    return found
