@@ -146,12 +146,20 @@ def _times_course(n: int, X: Any, F: Any, ones: Any, Y: Any) -> None:
 def linear_back(step: Any, H_Phi: Any, gain: Any, L: Any, A: Any, U: Any, white: Any, behind: Any, forms: Any) -> None:
     """Linear forms of ``(e_k, w)`` (n + w): of innovations with what goes on behind each k of `behind`, which ascends."""
     n, m, courses = gain.shape[1], gain.shape[2], U.shape[1]
-    form, now, v = np.zeros(n + courses), np.zeros(n), np.zeros(m)
+    form, now, v = np.zeros(n), np.zeros(n), np.zeros(m)
+    states, measured = (
+        np.zeros(n),
+        np.zeros(courses),
+    )  # of the courses: what enters the states, summed up, and the measurements
     row = len(behind) - 1
     for k in range(len(step) - 1, -1, -1):
         while row >= 0 and behind[row] == k:
-            for i in range(n + courses):
+            for i in range(n):
                 forms[row, i] = form[i]
+            for w in range(courses):
+                forms[row, n + w] = measured[w]
+                for i in range(n):
+                    forms[row, n + w] += U[i, w] * states[i]
             row -= 1
         if row < 0:
             break
@@ -171,9 +179,7 @@ def linear_back(step: Any, H_Phi: Any, gain: Any, L: Any, A: Any, U: Any, white:
             for j in range(n):
                 v[a] -= gain[k, j, a] * form[j]
             for w in range(courses):
-                form[n + w] += A[k, a, w] * v[a]
+                measured[w] += A[k, a, w] * v[a]
         for i in range(n):
-            for w in range(courses):
-                form[n + w] += U[i, w] * now[i]
-        for i in range(n):
+            states[i] += now[i]
             form[i] = now[i]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
 from truenorth.core.earth import EARTH_RATE
+from truenorth.core.remembered import remembered
 from truenorth.errors.staying import Form, StaticModel
 from truenorth.filters.known import Common
 from truenorth.records.specs import ImuSpec
@@ -43,6 +44,19 @@ def in_few_cells(spec: ImuSpec, lat: float) -> bool:
 
 def cell_of(C_n0_i: Array, integrals: InertialIntegrals, lat: float) -> Array | None:
     """The attitude (3, 3) of a log's cell; None of a log that leaves it, or is long."""
+    found, key = _cells(integrals), (C_n0_i.tobytes(), lat)
+    if key not in found:
+        found[key] = _cell_of(C_n0_i, integrals, lat)
+    return found[key]
+
+
+@remembered
+def _cells(integrals: InertialIntegrals) -> dict[tuple[bytes, float], Array | None]:
+    """Cells of a log by its attitude: its prior, its check and its alignment ask for one."""
+    return {}
+
+
+def _cell_of(C_n0_i: Array, integrals: InertialIntegrals, lat: float) -> Array | None:
     if len(integrals.intervals) > MOST_EPOCHS:
         return None
     q = np.round(quaternion_from_dcm(C_n0_i) / STEP) * STEP
