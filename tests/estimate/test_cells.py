@@ -43,7 +43,6 @@ def test_state_with_known_gains_is_that_of_the_filter():
 
 
 def test_what_is_put_in_its_place_is_not_known():
-    rng = np.random.default_rng(1)
     system = LinearSystem(
         np.eye(2)[None], np.eye(2)[None], np.eye(2)[None], np.eye(2)[None], np.zeros((5, 2)), np.zeros(2), np.eye(2)
     )
