@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from truenorth import align, imu_spec
-from truenorth.core.attitude import dcm_from_euler, misalignment
+from truenorth.core.attitude import dcm_from_euler, misalignment, quaternion_from_dcm
 from truenorth.core.position import Position
 from truenorth.estimate import cells
 from truenorth.estimate.cells import STEP, cell_of, in_few_cells
@@ -14,6 +15,7 @@ from truenorth.simulation import Sway, simulate
 from truenorth.strapdown.inertial import integrate
 
 PLACE = Position.from_degrees(45.0)
+HALF_TURNS = ((1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
 
 
 def record_of(heading: float, seed: int, duration: float = 300.0):
@@ -100,3 +102,13 @@ def test_as_without_cells(monkeypatch):
         assert np.abs(off).max() < 0.01
         assert np.abs((cell.gyro_bias - own.gyro_bias) / own.gyro_bias_sigma).max() < 0.02
         np.testing.assert_allclose(cell.phi_covariance.diagonal(), own.phi_covariance.diagonal(), rtol=2e-3)
+
+
+def test_quaternion_is_that_of_the_library():
+    for C in (
+        np.eye(3),
+        *Rotation.random(50, rng=np.random.default_rng(1)).as_matrix(),
+        *(np.diag(d) for d in HALF_TURNS),
+    ):
+        q = np.array(cells._quaternion(C.tolist()))
+        np.testing.assert_allclose(np.sign(q @ quaternion_from_dcm(C)) * q, quaternion_from_dcm(C), atol=1e-15)

@@ -187,7 +187,7 @@ def _of_known(seen: Innovations, gains: SharedGains, of: _Together, banks: Seque
     white, behind = np.ascontiguousarray(seen.white[:, :, 0]), of.behind
     forms = np.zeros((len(behind), len(known.begun)))
     A, U = of.measured_course, of.state_course
-    linear_back(gains.step, gains.H_Phi, gains.gain, gains.L, A, U, white, behind, forms)
+    linear_back(gains.places, gains.values, gains.H_Phi, gains.gain, gains.L, A, U, white, behind, forms)
     match = np.einsum("as,sa->s", known.first, white[of.epoch]) + np.einsum("is,si->s", known.begun, forms[of.at])
     return _by_bank(known.energy, match, known.left, banks)
 

@@ -143,8 +143,13 @@ def _times_course(n: int, X: Any, F: Any, ones: Any, Y: Any) -> None:
 
 
 @compiled
-def linear_back(step: Any, H_Phi: Any, gain: Any, L: Any, A: Any, U: Any, white: Any, behind: Any, forms: Any) -> None:
-    """Linear forms of ``(e_k, w)`` (n + w): of innovations with what goes on behind each k of `behind`, which ascends."""
+def linear_back(
+    places: Any, values: Any, H_Phi: Any, gain: Any, L: Any, A: Any, U: Any, white: Any, behind: Any, forms: Any
+) -> None:
+    """Linear forms of ``(e_k, w)`` (n + w): of innovations with what goes on behind each k of `behind`, which ascends.
+
+    An error goes on by ``(I - K H) Phi = Phi - K H_Phi``; of Phi those elements that are not zero, in their places.
+    """
     n, m, courses = gain.shape[1], gain.shape[2], U.shape[1]
     form, now, v = np.zeros(n), np.zeros(n), np.zeros(m)
     states, measured = (
@@ -152,7 +157,7 @@ def linear_back(step: Any, H_Phi: Any, gain: Any, L: Any, A: Any, U: Any, white:
         np.zeros(courses),
     )  # of the courses: what enters the states, summed up, and the measurements
     row = len(behind) - 1
-    for k in range(len(step) - 1, -1, -1):
+    for k in range(len(gain) - 1, -1, -1):
         while row >= 0 and behind[row] == k:
             for i in range(n):
                 forms[row, i] = form[i]
@@ -171,15 +176,14 @@ def linear_back(step: Any, H_Phi: Any, gain: Any, L: Any, A: Any, U: Any, white:
         for i in range(n):
             now[i] = 0.0
             for a in range(m):
-                now[i] += H_Phi[k, a, i] * v[a]
-        for j in range(n):
-            for i in range(n):
-                now[i] += step[k, j, i] * form[j]
+                v[a] -= gain[k, i, a] * form[i]
         for a in range(m):
-            for j in range(n):
-                v[a] -= gain[k, j, a] * form[j]
+            for i in range(n):
+                now[i] += H_Phi[k, a, i] * v[a]
             for w in range(courses):
                 measured[w] += A[k, a, w] * v[a]
+        for e in range(len(places)):
+            now[places[e, 1]] += values[k, e] * form[places[e, 0]]
         for i in range(n):
             states[i] += now[i]
             form[i] = now[i]

@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
+from truenorth.core.attitude import dcm_from_quaternion
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.remembered import remembered
 from truenorth.errors.staying import Form, StaticModel
@@ -59,11 +59,26 @@ def _cells(integrals: InertialIntegrals) -> dict[tuple[bytes, float], Array | No
 def _cell_of(C_n0_i: Array, integrals: InertialIntegrals, lat: float) -> Array | None:
     if len(integrals.intervals) > MOST_EPOCHS:
         return None
-    q = np.round(quaternion_from_dcm(C_n0_i) / STEP) * STEP
-    cell = dcm_from_quaternion(q / math.sqrt(float(q @ q)))
+    q = [round(x / STEP) * STEP for x in _quaternion(C_n0_i.tolist())]
+    size = math.sqrt(sum(x * x for x in q))
+    cell = dcm_from_quaternion([x / size for x in q])
     means = np.ascontiguousarray(integrals.C_mean.transpose(1, 0, 2)).reshape(3, -1)
     off = C_n0_i @ means - _turned(cell.tobytes(), integrals.time.tobytes(), lat)
     return cell if float(max(off.max(), -off.min())) < NEAR else None
+
+
+def _quaternion(C: list[list[float]]) -> list[float]:
+    """The quaternion of a matrix, scalar first, by the largest of its components: of a single one arrays take ten times as long."""
+    trace = C[0][0] + C[1][1] + C[2][2]
+    squares = [1.0 + trace, *(1.0 + 2.0 * C[i][i] - trace for i in range(3))]  # four times those of the components
+    largest = max(range(4), key=squares.__getitem__)
+    off = [C[2][1] - C[1][2], C[0][2] - C[2][0], C[1][0] - C[0][1]]
+    if largest == 0:
+        row = [squares[0], *off]
+    else:
+        i = largest - 1
+        row = [off[i], *(squares[largest] if j == i else C[i][j] + C[j][i] for j in range(3))]
+    return [x / (2.0 * math.sqrt(squares[largest])) for x in row]
 
 
 @lru_cache(maxsize=MOST_CELLS)

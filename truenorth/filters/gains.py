@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
@@ -243,11 +244,15 @@ class SharedGains(Gains):
     ----------
     L : (K, m, m) array
         Of each innovation's covariance ``L L'``.
+    places, values : (E, 2) and (K, E) arrays
+        Elements of ``Phi`` that are not zero at every epoch, by row and column: most are.
     found : dict
         What depends on the gains alone, by whatever else decides it: it is worked out once.
     """
 
     L: Array
+    places: NDArray[np.int64]
+    values: Array
     found: dict[Any, Any]
 
     def once(self, key: Any, work: Callable[[], T]) -> T:

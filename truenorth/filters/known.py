@@ -39,15 +39,18 @@ class Known:
     def __init__(self, system: LinearSystem) -> None:
         silent = system.with_made(z=np.zeros_like(system.z), x0=np.zeros(system.states))
         self.estimates = kalman(silent, history="full")
-        self.gains = SharedGains._make(filter_gains(silent, self.estimates))
-        self.gains.L, self.gains.found = factors(self.estimates.innovation_covariance), {}
-        self.size = float(np.log(self.gains.L.diagonal(axis1=1, axis2=2)).sum()) + 0.5 * silent.z.size * LOG_2PI
+        gains = self.gains = SharedGains._make(filter_gains(silent, self.estimates))
+        gains.L, gains.found = factors(self.estimates.innovation_covariance), {}
+        gains.places = np.argwhere((gains.Phi != 0.0).any(axis=0))
+        gains.values = np.empty((len(silent.z), len(gains.places)))
+        gains.values[:] = gains.Phi[:, gains.places[:, 0], gains.places[:, 1]]
+        self.size = float(np.log(gains.L.diagonal(axis1=1, axis2=2)).sum()) + 0.5 * silent.z.size * LOG_2PI
 
     def estimates_of(self, z: Array, x0: Array, history: History) -> Estimates:
         """What the filter makes of measurements (K, m) and a state before them."""
         silent, gains, count = self.estimates, self.gains, len(z)
         x, innovation, nis = np.empty(silent.x.shape), np.empty(z.shape), np.empty(count)
-        _follow(gains.Phi, gains.gain, gains.H_Phi, gains.L, z, x0, x, innovation, nis)
+        _follow(gains.places, gains.values, gains.gain, gains.H_Phi, gains.L, z, x0, x, innovation, nis)
         log_likelihood = np.array(-0.5 * float(nis.sum()) - self.size)
         state = FilterState(x[-1], silent.P[-1], log_likelihood, silent.state.memory)
         first = count - 1 if history == "last" else 0
@@ -103,10 +106,12 @@ class SharedSystem(LinearSystem):
 
 
 @compiled
-def _follow(Phi: Any, gain: Any, H_Phi: Any, L: Any, z: Any, x0: Any, x: Any, innovation: Any, nis: Any) -> None:
+def _follow(
+    places: Any, values: Any, gain: Any, H_Phi: Any, L: Any, z: Any, x0: Any, x: Any, innovation: Any, nis: Any
+) -> None:
     """State behind each epoch, innovations, and the squares of those made white."""
     n, m = gain.shape[1], gain.shape[2]
-    before, white = x0.copy(), np.zeros(m)
+    before, now, white = x0.copy(), np.zeros(n), np.zeros(m)
     for k in range(len(z)):
         nis[k] = 0.0
         for a in range(m):
@@ -119,11 +124,10 @@ def _follow(Phi: Any, gain: Any, H_Phi: Any, L: Any, z: Any, x0: Any, x: Any, in
             white[a] = y / L[k, a, a]
             nis[k] += white[a] * white[a]
         for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += Phi[k, i, j] * before[j]
+            now[i] = 0.0
             for a in range(m):
-                total += gain[k, i, a] * innovation[k, a]
-            x[k, i] = total
+                now[i] += gain[k, i, a] * innovation[k, a]
+        for e in range(len(places)):
+            now[places[e, 0]] += values[k, e] * before[places[e, 1]]
         for i in range(n):
-            before[i] = x[k, i]
+            x[k, i] = before[i] = now[i]
