@@ -82,11 +82,13 @@ class Common:
     def known_with(self, R: Array, P0: Array) -> Known:
         """What a filter makes of it."""
         key = R.tobytes(), P0.tobytes()
-        if key not in self._known:
+        known = self._known.get(key)
+        if known is None:
+            known = Known(self.system.with_made(R=R, P0=P0))
             if len(self._known) >= MOST_KNOWN:
                 self._known.clear()
-            self._known[key] = Known(self.system.with_made(R=R, P0=P0))
-        return self._known[key]
+            self._known[key] = known
+        return known
 
 
 @dataclass(frozen=True)
