@@ -32,7 +32,7 @@ _ALIGN = truenorth.alignment.procedure
 PARTS: tuple[tuple[str, Any, str], ...] = (
     ("simulation", truenorth.simulation.runs, "apply_errors"),
     ("kind of motion", truenorth.alignment.task, "motion_summary"),
-    ("mean rate and force", truenorth.alignment.task, "means"),
+    ("mean rate and force", truenorth.alignment.task, "means_at_rest"),
     ("integration in the inertial frame", _ALIGN, "integrate"),
     ("coarse attitude", _ALIGN, "oba"),
     ("filter that checks the log", _ALIGN, "check_filter"),

@@ -7,8 +7,8 @@ import pytest
 
 from truenorth import align, imu_spec
 from truenorth.alignment.bias_step import _follow
-from truenorth.alignment.matched import _sum_back
 from truenorth.alignment.motion_likelihood import _folded_autocovariances
+from truenorth.alignment.summed_back import sum_back
 from truenorth.cli import ahead
 from truenorth.core import kernel_folder, processor
 from truenorth.core.kernel_lock import KernelLock
@@ -26,7 +26,7 @@ KERNELS = (
     linear_runs,
     _folded_autocovariances,
     fill_blocks,
-    _sum_back,
+    sum_back,
     _fill,
     _parts,
     _through,
@@ -45,7 +45,7 @@ def test_its_kernels_are_those_of_an_alignment():
     ahead.match()
     ahead.turn()
     ahead._filtered(ahead.STATES)
-    assert kind_of(ahead._of_last()) in _sum_back.signatures
+    assert kind_of(ahead._of_last()) in sum_back.signatures
     assert [kinds(kernel) for kernel in KERNELS] == before
 
 
@@ -82,7 +82,7 @@ def test_what_comes_with_the_package_counts_where_it_is_of_these_sources(tmp_pat
     folder = processor.folder_of("x86-64-v3")
     folder.mkdir()
     asked = []
-    monkeypatch.setattr(_sum_back, "is_there", lambda *arguments: asked.append(arguments) or len(asked) > 1)
+    monkeypatch.setattr(sum_back, "is_there", lambda *arguments: asked.append(arguments) or len(asked) > 1)
     assert not ahead._ships()
     assert asked == []
     (folder / f"{ahead.LAST}-0123.code").touch()

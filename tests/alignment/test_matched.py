@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import matched as module
-from truenorth.alignment.matched import AT_REST, Innovations, Signatures, innovations_of, matched
+from truenorth.alignment.matched import Innovations, Signatures, innovations_of, matched
+from truenorth.alignment.summed_back import AT_REST
 from truenorth.errors.staying import PHI
 from truenorth.filters import LinearSystem, filter_gains, kalman
 

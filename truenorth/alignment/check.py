@@ -92,18 +92,24 @@ def check_means(m: Means, lat: float, g: float) -> LogCheck:
 
 
 def check_filter(
-    task: Task, integrals: InertialIntegrals, C_n0_i: Array, usual: StaticModel, known: StaticModel | None = None
+    task: Task,
+    integrals: InertialIntegrals,
+    C_n0_i: Array,
+    usual: StaticModel,
+    known: StaticModel | None = None,
+    cell: Array | None = None,
 ) -> tuple[LogCheck, StaticModel]:
     """What the inertial frame shows of the biases and random walks: a filter that believes in no specified bias.
 
-    The random walks are fitted about the usual ones, unless they are known.
+    The random walks are fitted about the usual ones, unless they are known. Biases act by the attitude of the cell, where there
+    is one (:mod:`truenorth.estimate.cells`).
     """
-    C_n_b = C_n0_i.T
+    C_n_b = C_n0_i.T if cell is None else cell.T
     P = np.zeros((6, 6))
     P[:3, :3] = C_n_b @ FREE_GYRO @ C_n_b.T
     P[3:, 3:] = C_n_b @ FREE_ACCEL @ C_n_b.T
     noise = usual if known is None else known
-    start = CoarseStart(task.record, C_n0_i, task.position, noise, P, task.interval)
+    start = CoarseStart(task.record, C_n0_i, task.position, noise, P, task.interval, shares=cell is not None)
     sways = task.motion.overall != "still"
     log, last, _ = settle_fine(start, integrals, sways=sways, history=False)
     if known is None:

@@ -32,7 +32,7 @@ from truenorth.errors.staying import (
     gained_velocity,
     mean_velocity,
 )
-from truenorth.estimate.base_motion import VelocityNoise, white_variance
+from truenorth.estimate.base_motion import FilteredAsKnown, VelocityNoise, white_variance
 from truenorth.estimate.batch import ROUGHLY, Filtered, Settled, in_sigmas, settle
 from truenorth.estimate.staying import KnownSensors, StayingLog, prior_of
 from truenorth.filters.gains import Gains, filter_gains, initial_part
@@ -76,10 +76,15 @@ class FineAlignment(Filtered):
     def of(cls, log: StayingLog, last: Settled[Filtered], kept: slice, disturbance: Array, **more: Any) -> Self:
         """What the last pass over a log left; `kept` are the states whose prior makes the floor, `more` a subclass's own."""
         system, estimates = last.found.system, last.found.estimates
-        gains = filter_gains(system, estimates)
         P0 = np.zeros((system.states, system.states))
         P0[kept, kept] = log.prior.P[kept, kept]
-        floors, floor = initial_part(gains.step, P0, PHI)
+        if isinstance(last.found, FilteredAsKnown):
+            shared = last.found.gains  # of one prior: the part kept decides
+            gains: Gains = shared
+            floors, floor = shared.once(("floor", kept.start, kept.stop), lambda: initial_part(shared.step, P0, PHI))
+        else:
+            gains = filter_gains(system, estimates)
+            floors, floor = initial_part(gains.step, P0, PHI)
         # What follows needs the noise of the first interval alone; that of all takes memory.
         system = system.with_made(Q=system.Q[:1].copy(), S=None if system.S is None else system.S[:1].copy())
         return cls(
@@ -188,6 +193,9 @@ class CoarseStart(NamedTuple):
     interval: float  # s; of the filter
     rows_at: Array | None = None  # (M,) int: rows after which the integrated attitude is wanted
     sensors: KnownSensors | None = None  # coarse errors, to take off to begin with
+    shares: bool = (
+        False  # whether biases act by the attitude of a cell, and `P_bias` is of it (:mod:`truenorth.estimate.cells`)
+    )
 
     def right_record(self) -> ImuRecord:
         """The record without the coarse errors of its sensors."""
@@ -236,7 +244,7 @@ def settle_fine(
     history: bool = True,
 ) -> tuple[StayingLog, Settled[Filtered], Array]:
     """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains (or a history) are not wanted."""
-    record, C_n0_i, position, model, P_bias, interval, rows_at, _ = start
+    record, C_n0_i, position, model, P_bias, interval, rows_at, _, shares = start
     arm_sigma = ARM_PRIOR if sways else TURN_ARM
     arm = None if turned is None and not sways else np.zeros(3)
     # Of a log that short the slow turn is a bend, which an arm that waves show would make a bent course, and a tilt, of.
@@ -244,18 +252,33 @@ def settle_fine(
     slow_arm = ARM_PRIOR if bent else 0.0
     prior = prior_of(P_bias, spec=turned, arm=arm, arm_sigma=arm_sigma, slow_arm_sigma=slow_arm)
     log = StayingLog(
-        record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, sways=sways, form=form
+        record,
+        C_n0_i,
+        position,
+        model,
+        prior,
+        interval,
+        rows_at,
+        integrals=integrals,
+        sways=sways,
+        form=form,
+        shares=shares,
     )
     if form == "velocity":
+        own, least = model.accel_random_walk**2 * interval / 3.0, QUIETEST_BASE**2
         R = white_variance(mean_velocity(log.integrals, C_n0_i, position.lat, position.alt))
-        own = model.accel_random_walk**2 * interval / 3.0
-        R = np.where(EXPLAINED * own > R, QUIETEST_BASE**2, R)
+        R = np.where(EXPLAINED * own > R, least, R)
     else:
         expected = model.accel_random_walk**2 * interval
+        least = max(SLIGHT * expected, QUIETEST_BASE**2)
         gained = gained_velocity(log.integrals, C_n0_i, position.lat, position.alt)
-        R = np.maximum(white_variance(gained) - expected, max(SLIGHT * expected, QUIETEST_BASE**2))
+        R = np.maximum(white_variance(gained) - expected, least)
+    if shares:  # no motion, with which the filter is known already: it costs nothing to ask it
+        R = np.full(3, least)
     everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
-    noise = VelocityNoise(np.full((len(everywhere), 3), R), [everywhere], MAX_NOISE_PASSES, history=history)
+    noise = VelocityNoise(
+        np.full((len(everywhere), 3), R), [everywhere], MAX_NOISE_PASSES, history=history, usual=shares
+    )
     most = BENT_PASSES if bent else MAX_PASSES
     last = settle(log, noise, left_over(float(log.integrals.time[-1])), most=most)
     return log, last, np.sqrt(noise.R[0])

@@ -15,6 +15,7 @@ linear systems", IEEE Trans. Autom. Control 21 (1976), eqs. 13-20.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -22,18 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
-from truenorth.core.compiled import borrowing, compiled
-from truenorth.core.linalg import copy_corner, four_rows_within, mirror_upper, transpose_block
-from truenorth.core.vectors import load8, minus8, over8, plus8, product8, spread8, store8, times8, zero8
-from truenorth.errors.staying import STARTS
-from truenorth.filters.gains import Gains, through
+from truenorth.alignment.summed_back import AT_REST, linear_back, sum_back, sum_back_at_rest
+from truenorth.core.compiled import compiled
+from truenorth.filters.gains import Gains, SharedGains, factors, through
 
 Array = NDArray[np.float64]
-
-
-# States, rows of the measurement, states with all courses, and columns of innovations, of a base at rest: written in a kernel, they
-# save it a quarter of its time (:data:`truenorth.filters.gains.AT_REST`).
-AT_REST = 12, 3, 23, 1
 
 
 class Signatures(NamedTuple):
@@ -108,21 +102,8 @@ def innovations_of(fine: FineAlignment, others: Array | None = None) -> Innovati
     seen = fine.estimates.innovation[..., None]
     if others is not None:
         seen = np.concatenate([seen, through(fine.gains, others)[0]], axis=2)
-    L = np.zeros(fine.estimates.innovation_covariance.shape)
-    _factor(np.ascontiguousarray(fine.estimates.innovation_covariance), L)
+    L = fine.gains.L if isinstance(fine.gains, SharedGains) else factors(fine.estimates.innovation_covariance)
     return Innovations(L, fine.gains, whitened(L, seen))
-
-
-@compiled
-def _factor(covariance: Any, L: Any) -> None:
-    """Lower triangles of ``L L'`` of (K, m, m), zero so far: of small matrices a library takes longer to begin than to do it."""
-    for k in range(len(L)):
-        for i in range(L.shape[1]):
-            for j in range(i + 1):
-                total = covariance[k, i, j]
-                for r in range(j):
-                    total -= L[k, i, r] * L[k, j, r]
-                L[k, i, j] = np.sqrt(total) if i == j else total / L[k, j, j]
 
 
 def whitened(L: Array, x: Array) -> Array:
@@ -148,18 +129,10 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
         One for each bank.
     """
     all_of = _together(banks)
-    (n, courses), right, gains = all_of.state_course.shape, seen.white.shape[2], seen.gains
-    behind = all_of.behind
-    forms = np.empty((len(behind), n + courses, n + courses + right))
-    ends = np.empty((len(behind), 3, n + courses))
-    of_gains = tuple(np.ascontiguousarray(a) for a in (gains.step, gains.H_Phi, gains.gain, seen.L))
-    white = np.ascontiguousarray(seen.white)
-    at_rest = (n, gains.gain.shape[-1], n + courses, right) == AT_REST
-    sum_back = _sum_back_at_rest if at_rest else _sum_back
-    sum_back(of_gains, all_of.measured_course, all_of.state_course, white, behind, forms, ends)
-    count = len(all_of.epoch)
-    energy, match, left = np.empty(count), np.empty((count, right)), np.empty((3, count))
-    _match_each(all_of, *of_gains, white, forms, ends, np.empty((2, n + courses)), energy, match, left)
+    if isinstance(seen.gains, SharedGains) and seen.white.shape[2] == 1:
+        return _of_known(seen, seen.gains, all_of, banks)
+    energy, match, left = _match(seen, all_of)
+    white, right = seen.white, seen.white.shape[2]
     of_innovations = match[:, 0]
     if right > 1:
         others = white[:, :, 1:].reshape(white[..., 0].size, -1)
@@ -167,11 +140,65 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
         explained = np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, known)
         energy = energy - np.einsum("sr,rs->s", match[:, 1:], explained[:, 1:])
         of_innovations = of_innovations - match[:, 1:] @ explained[:, 0]
-    energy = np.maximum(energy, 1e-300)
+    return _by_bank(np.maximum(energy, 1e-300), of_innovations, left, banks)
+
+
+def _match(seen: Innovations, all_of: _Together) -> tuple[Array, Array, Array]:
+    """Energy (S,), match (S, 1 + M) and what is left at the end (3, S) of each signature."""
+    (n, courses), right, gains = all_of.state_course.shape, seen.white.shape[2], seen.gains
+    behind = all_of.behind
+    forms = np.empty((len(behind), n + courses, n + courses + right))
+    ends = np.empty((len(behind), 3, n + courses))
+    of_gains = tuple(np.ascontiguousarray(a) for a in (gains.step, gains.H_Phi, gains.gain, seen.L))
+    white = np.ascontiguousarray(seen.white)
+    at_rest = (n, gains.gain.shape[-1], n + courses, right) == AT_REST
+    sum_up = sum_back_at_rest if at_rest else sum_back
+    sum_up(of_gains, all_of.measured_course, all_of.state_course, white, behind, forms, ends)
+    count = len(all_of.epoch)
+    energy, match, left = np.empty(count), np.empty((count, right)), np.empty((3, count))
+    _match_each(all_of, *of_gains, white, forms, ends, np.empty((2, n + courses)), energy, match, left)
+    return energy, match, left
+
+
+def _by_bank(energy: Array, of_innovations: Array, left: Array, banks: Sequence[Signatures]) -> tuple[Match, ...]:
+    """A match for each bank."""
     size = of_innovations / energy
     ratio, edges = of_innovations * size, np.cumsum([0, *(len(bank.epoch) for bank in banks)]).tolist()
     parts = (slice(*pair) for pair in pairwise(edges))
     return tuple(Match(ratio[part], size[part], left[:, part]) for part in parts)
+
+
+class _Responses(NamedTuple):
+    """What gains that logs share decide of signatures."""
+
+    of: _Together  # held: its number is its own as long
+    energy: Array  # (S,)
+    left: Array  # (3, S)
+    first: Array  # (m, S): of each in its first epoch, made white
+    begun: Array  # (n + w, S): the error behind it, and the sizes of its courses
+
+
+def _of_known(seen: Innovations, gains: SharedGains, of: _Together, banks: Sequence[Signatures]) -> tuple[Match, ...]:
+    """:func:`matched` by gains that logs share: what does not depend on the innovations is worked out once.
+
+    What does is a linear form of the innovations behind each epoch, followed back: a row, not a matrix.
+    """
+    known = gains.once(("signatures", id(of)), lambda: _responses(gains, of))
+    white, behind = np.ascontiguousarray(seen.white[:, :, 0]), of.behind
+    forms = np.zeros((len(behind), len(known.begun)))
+    A, U = of.measured_course, of.state_course
+    linear_back(gains.places, gains.values, gains.H_Phi, gains.gain, gains.L, A, U, white, behind, forms)
+    match = np.einsum("as,sa->s", known.first, white[of.epoch]) + np.einsum("is,si->s", known.begun, forms[of.at])
+    return _by_bank(known.energy, match, known.left, banks)
+
+
+def _responses(gains: SharedGains, of: _Together) -> _Responses:
+    silent = Innovations(gains.L, gains, np.zeros((*gains.gain.shape[::2], 1)))
+    energy, _, left = _match(silent, of)
+    k, measured, state = of.epoch, of.measured.T[..., None], of.state.T[..., None]
+    first = whitened(gains.L[k], measured + gains.H_Phi[k] @ state)[..., 0].T
+    begun = np.concatenate([(gains.step[k] @ state - gains.gain[k] @ measured)[..., 0].T, of.after])
+    return _Responses(of, np.maximum(energy, 1e-300), left, first, begun)
 
 
 class _Together(NamedTuple):
@@ -267,129 +294,3 @@ def _match_each(
             left[a, s] = 0.0
             for j in range(own):
                 left[a, s] += ends[at, a, j] * begun[j]
-
-
-@compiled
-def _sum_back(of_gains: Any, A: Any, U: Any, seen: Any, behind: Any, forms: Any, ends: Any) -> None:
-    """:func:`_forms_of` any sizes."""
-    step, _, gain, _ = of_gains
-    sizes = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
-    _forms_of(sizes, of_gains, A, U, seen, behind, forms, ends)
-
-
-@compiled
-def _sum_back_at_rest(of_gains: Any, A: Any, U: Any, seen: Any, behind: Any, forms: Any, ends: Any) -> None:
-    """:func:`_forms_of` a base at rest."""
-    _forms_of(AT_REST, of_gains, A, U, seen, behind, forms, ends)
-
-
-@compiled(forceinline=True)
-def _forms_of(sizes: Any, of_gains: Any, A: Any, U: Any, seen: Any, behind: Any, forms: Any, ends: Any) -> None:
-    """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last misalignment of it.
-
-    The quadratic form comes first, the linear ones of the innovations are columns behind it. Rows have zeros at their ends.
-    """
-    misalignment, (step, H_Phi, gain, L) = STARTS[0], of_gains
-    n, m, used, right = sizes
-    N, rows, wide = 4 * ((n + 3) // 4), 4 * ((used + 3) // 4), 8 * ((used + right + 7) // 8)
-    form, end = np.zeros((rows, wide)), np.zeros((4, wide))
-    for i in range(3):
-        end[i, misalignment + i] = 1.0
-    form_before, end_before, T = np.zeros_like(form), np.zeros_like(end), np.zeros_like(form)
-    # e goes on as F (e, w), and is seen, made white, as G (e, w), which stands below T; behind G stand the innovations.
-    whole, course, measured, ones = np.zeros((N, N)), np.zeros((N, wide)), np.zeros((m, wide)), np.zeros(wide)
-    for i in range(n):
-        course[i, i] = 1.0
-        for j in range(U.shape[1]):
-            course[i, n + j] = U[i, j]
-    ones[n:] = 1.0
-    F, above_t, below = np.zeros((N, wide)), np.zeros((rows, N + m)), np.zeros((n + m, wide))
-    row = len(behind) - 1
-    for k in range(step.shape[0] - 1, -1, -1):
-        while row >= 0 and behind[row] == k:
-            _keep(form, forms[row])
-            _keep(end, ends[row])
-            row -= 1
-        if row < 0:
-            break
-        copy_corner(step[k], whole, n, n)
-        for i in range(m):
-            for j in range(A.shape[2]):
-                measured[i, n + j] = A[k, i, j]
-        _go_on(whole, gain[k], measured, course, F)
-        _see(H_Phi[k], L[k], measured, course, below)
-        for i in range(m):
-            for j in range(right):
-                below[n + i, used + j] = seen[k, i, j]
-        _times_course(n, form, F, ones, T)
-        # [F; G]' [T; G], and T itself of the courses: M' form M + G' G.
-        for i in range(0, rows, 4):
-            for j in range(0, N, 4):
-                transpose_block(F, j, i, above_t)
-        for i in range(m):
-            for j in range(used):
-                above_t[j, n + i] = below[n + i, j]
-        copy_corner(T, below, n, wide)
-        for i in range(0, rows, 4):  # what stands before the diagonal is what stands behind it
-            four_rows_within(n + m, above_t, below, None, i, 8 * (i // 8), wide, form_before)
-        for i in range(n, rows):
-            for j in range(8 * (i // 8), wide, 8):
-                store8(form_before, (i, j), plus8(load8(form_before, (i, j)), load8(T, (i, j))))
-        mirror_upper(rows, form_before)
-        form, form_before = form_before, form
-        _times_course(n, end, F, ones, end_before)
-        end, end_before = end_before, end
-
-
-@compiled
-def _keep(values: Any, place: Any) -> None:
-    """``place = values``, as far as it goes: one by one, since Numba takes a second to compile what checks whole arrays' shapes."""
-    for i in range(place.shape[0]):
-        for j in range(place.shape[1]):
-            place[i, j] = values[i, j]
-
-
-@borrowing(forceinline=True)
-def _go_on(step: Any, gain: Any, A: Any, course: Any, F: Any) -> None:
-    """``F = step [I, U] - gain [0, A]``, with ``course = [I, U]``; `A` stands where the courses do."""
-    n, known = gain.shape[0], 8 * (gain.shape[0] // 8)  # columns of the step itself
-    for i in range(0, len(step), 4):
-        four_rows_within(n, step, course, None, i, known, F.shape[1], F)
-    for i in range(n):
-        for j in range(0, known, 8):
-            store8(F, (i, j), load8(step, (i, j)))
-        for j in range(known, F.shape[1], 8):
-            left = load8(F, (i, j))
-            for r in range(gain.shape[1]):
-                left = minus8(left, times8(gain[i, r], load8(A, (r, j))))
-            store8(F, (i, j), left)
-
-
-@borrowing(forceinline=True)
-def _see(H_Phi: Any, L: Any, A: Any, course: Any, below: Any) -> None:
-    """``G = L^-1 (H Phi [I, U] + [0, A])``, L lower triangular, below the rows of T."""
-    m, n = H_Phi.shape
-    known = 8 * (n // 8)
-    for i in range(m):
-        for j in range(0, below.shape[1], 8):
-            if j < known:
-                total = load8(H_Phi, (i, j))
-            else:
-                total = zero8()
-                for r in range(n):
-                    total = plus8(total, times8(H_Phi[i, r], load8(course, (r, j))))
-                total = plus8(total, load8(A, (i, j)))
-            for r in range(i):
-                total = minus8(total, times8(L[i, r], load8(below, (n + r, j))))
-            store8(below, (n + i, j), over8(total, spread8(L[i, i])))
-
-
-@borrowing(forceinline=True)
-def _times_course(n: int, X: Any, F: Any, ones: Any, Y: Any) -> None:
-    """``Y = X M`` with ``M = [F; 0 I]``, the identity behind the first n, where `ones` are; of rows of courses the upper half."""
-    for i in range(0, X.shape[0], 4):
-        first = 8 * (i // 8) if i >= n else 0
-        four_rows_within(n, X, F, None, i, first, Y.shape[1], Y)
-    for i in range(X.shape[0]):
-        for j in range(8 * (max(n, i) // 8), Y.shape[1], 8):
-            store8(Y, (i, j), plus8(load8(Y, (i, j)), product8(load8(ones, (j,)), load8(X, (i, j)))))

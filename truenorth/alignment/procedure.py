@@ -56,6 +56,7 @@ from truenorth.coarse.uncertainty import own_motion
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.staying import BG, StaticModel, gained_velocity
+from truenorth.estimate.cells import cell_of, in_few_cells
 from truenorth.quality.density import specification_evidence
 from truenorth.quality.record_evidence import record_evidence, staying_evidence
 from truenorth.quality.regimes import MotionSummary
@@ -277,11 +278,13 @@ def _align_inertial(
         walks = turning_noise(task.record) if smooth else allan_noise(task.record)
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
     known = StaticModel.of(spec) if spec is not None else usual if brief else None
-    filtered, noise = check_filter(task, integrals, coarse.C_n0_i, usual, known)
-    check = sharper(filtered, means, task)
     turns = task.motion.fraction("rotating") > 0.0
+    shares = method == "kalman" and quiet and not turns and spec is not None and in_few_cells(spec, lat)
+    cell = cell_of(coarse.C_n0_i, integrals, lat) if shares else None
+    filtered, noise = check_filter(task, integrals, coarse.C_n0_i, usual, known, cell)
+    check = sharper(filtered, means, task)
     used, where = specification(spec, check, lambda: turning_noise(task.record) if turns else noise)
-    P = task.bias_prior(used, coarse.C_n0_i.T)
+    P = task.bias_prior(used, coarse.C_n0_i.T if cell is None else cell.T)
     if method in STATIONARY:
         return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
     if not refined:
@@ -297,7 +300,8 @@ def _align_inertial(
         P = np.diag(used.bias_variance)
     # A table that turns an IMU does not rock with it: its log is fitted as it is, and its IMU sits near the axis.
     swings = task.motion.overall != "still" and (turned is None or rocks_all_along(task.motion))
-    start = CoarseStart(task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
+    model, shared = StaticModel.of(used), cell is not None
+    start = CoarseStart(task.record, coarse.C_n0_i, task.position, model, P, task.interval, rows, shares=shared)
     if method in FADING:
         fine = faded_align(start, method)
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))

@@ -82,7 +82,7 @@ def _plain(system: LinearSystem) -> Filtered:
 
 def faded_align(start: CoarseStart, method: str, arm_velocity: Array | None = None) -> FineAlignment:
     """Align by kf, sakf, makf or imakf; `arm_velocity` is that of `SampledLog`."""
-    record, C_n0_i, position, model, P_bias, interval, rows_at, _ = start
+    record, C_n0_i, position, model, P_bias, interval, rows_at, *_ = start
     kind, prior = FADING[method], prior_of(P_bias)
     log = SampledLog(record, C_n0_i, position, model, prior, interval, rows_at)
     log.arm_velocity = arm_velocity

@@ -267,7 +267,7 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
     The fit knows no random walk. Of gyros that make a large one it takes the wander for signal, and its passes may run away:
     then the log is fitted with as little weight as the walk leaves it.
     """
-    record, C_n0_i, position, model, _, interval, rows_at, sensors = start
+    record, C_n0_i, position, model, _, interval, rows_at, sensors, _ = start
     prior = _prior(start, mount, turned)
     g = gravity_of_place(position.lat, position.alt)
     walked = math.sqrt(record.duration / 3.0) * math.hypot(

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-LAST = "truenorth.alignment.matched._sum_back"  # where it is on the disk, no first alignment waits any more
+LAST = "truenorth.alignment.summed_back.sum_back"  # where it is on the disk, no first alignment waits any more
 SWAY_STATES = 39  # of a base with two oscillations along each axis; what is padded to the same size shares its kernel
 STATES = 12  # of a base that stays
 NAME = "ahead"  # of the lock that a second process holds
@@ -51,9 +51,9 @@ def _ships() -> bool:
     level = shipped_level()
     if not level or next(folder_of(level).glob(f"{LAST}-*"), None) is None:
         return False
-    from truenorth.alignment.matched import _sum_back
+    from truenorth.alignment.summed_back import sum_back
 
-    return _sum_back.is_there(*_of_last())
+    return sum_back.is_there(*_of_last())
 
 
 def _of_last() -> tuple[Any, ...]:

@@ -92,9 +92,30 @@ class StaticModel(Walks):
         Phi, H = np.zeros((count, STATES, STATES)), np.zeros((count, 3, STATES))
         nominal = (np.ascontiguousarray(x) for x in (C_n0_i, integrals.C_mean, integrals.C_late))
         _transitions(integrals.intervals, *nominal, known.f, known.f_late, C_n_n0, Phi, H)
-        z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
+        z = measured_at_rest("velocity", integrals, C_n0_i, lat, alt)
         before = {"x0": np.zeros(STATES) if x0 is None else x0, "P0": np.ascontiguousarray(P0)}
         return known.noise.with_made(Phi=Phi, H=H, R=known.noise.R + np.diag(R), z=z, **before)
+
+    def linearise_at_rest(self, form: Form, time: Array, C_n0_b: Array, lat: float, alt: float) -> LinearSystem:
+        """The system of a base that has not turned on the earth, without what was measured; R is that of the quietest base.
+
+        Parameters
+        ----------
+        form : {"velocity", "force"}
+        time : (K+1,) array, s
+            Ends of the intervals.
+        C_n0_b : (3, 3) array
+            Attitude at the start, by which biases act.
+        """
+        known, T = _known_of(self, time.tobytes(), lat, alt), np.diff(time)
+        count = len(T)
+        Phi, H = np.zeros((count, STATES, STATES)), np.zeros((count, 3, STATES))
+        # The earth turns by 7e-5 rad a second: the mean of an attitude is the one in the middle, to some 1e-10, ...
+        mean = earth_rotation((time[1:] + time[:-1]) / 2, lat) @ C_n0_b
+        late = 0.5 * (earth_rotation(time[:-1] + T * (2.0 / 3.0), lat) @ C_n0_b)  # ... and int s C ds = T^2/2 C(2T/3)
+        _transitions(T, np.eye(3), mean, late, known.f, known.f_late, known.C_n_n0, Phi, H)
+        system = known.noise.with_made(Phi=Phi, H=H, R=known.noise.R + QUIETEST_BASE**2 * np.eye(3))
+        return system.with_made(**_seen_by_force(system, time, lat)) if form == "force" else system
 
 
 @compiled
@@ -290,11 +311,22 @@ def force_system(
     LinearSystem
         Whose R holds the variance of the quietest base only.
     """
-    C, count = local_axes(integrals.time, lat), len(integrals.intervals)
+    z = measured_at_rest("force", integrals, C_n0_i, lat, alt)
+    return core.with_made(z=z, **_seen_by_force(core, integrals.time, lat))
+
+
+def _seen_by_force(core: LinearSystem, time: Array, lat: float) -> dict[str, Array]:
+    """``H, R, S`` of :func:`force_system` over intervals between times."""
+    C, count = local_axes(time, lat), len(time) - 1
     H, R, S = np.empty((count, 3, STATES)), np.empty((count, 3, 3)), np.empty((count, STATES, 3))
     _gains_of_velocity(core.Phi, core.Q, np.ascontiguousarray(C), H, R, S)
-    z = (C @ gained_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-    return core.with_made(H=H, R=R, S=S, z=z)
+    return {"H": H, "R": R, "S": S}
+
+
+def measured_at_rest(form: Form, integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
+    """(K, 3) what a form measures, in navigation axes, m/s."""
+    found = (mean_velocity if form == "velocity" else gained_velocity)(integrals, C_n0_i, lat, alt)
+    return np.asarray((local_axes(integrals.time, lat) @ found[..., None])[..., 0])
 
 
 @compiled

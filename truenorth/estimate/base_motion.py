@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from truenorth.core.compiled import compiled
 from truenorth.errors.staying import QUIETEST_BASE
 from truenorth.estimate.batch import Filtered
 from truenorth.filters import Estimates, LinearSystem, kalman
+from truenorth.filters.gains import SharedGains
+from truenorth.filters.known import Known, SharedSystem
 
 Array = NDArray[np.float64]
 
@@ -118,6 +121,13 @@ class _Bracket:
         return math.sqrt(small * large) if closed and (asked >= large or asked <= small) else asked
 
 
+@dataclass(frozen=True)
+class FilteredAsKnown(Filtered):
+    """With the gains that other logs share."""
+
+    gains: SharedGains
+
+
 class VelocityNoise:
     """An estimator that filters with the variance of the base's velocity that the innovations ask for.
 
@@ -135,6 +145,8 @@ class VelocityNoise:
         Whether the estimates of every epoch are wanted, or those of the last alone.
     coloured : bool
         Whether the variance covers a base that wanders slowly, too. It is larger then than the likeliest.
+    usual : bool
+        Whether R, to begin with, is that of all bases at rest: what a filter makes of a system that logs share is known with it.
     """
 
     def __init__(
@@ -145,7 +157,9 @@ class VelocityNoise:
         *,
         history: bool = True,
         coloured: bool = True,
+        usual: bool = False,
     ) -> None:
+        self.usual = R if usual else None
         self.R, self.most, self.history = R, most, history
         self.whole = len(parts) == 1 and bool(parts[0].all())
         self.rows: list[Any] = [slice(None)] if self.whole else list(parts)  # of each part
@@ -154,7 +168,8 @@ class VelocityNoise:
     def __call__(self, quiet: LinearSystem) -> Filtered:
         """Filter a system that holds the variance of the quietest base so far."""
         system = self._with_motion(quiet)
-        estimates = self._filtered(system)
+        known = self._known(system)
+        estimates = self._filtered(system, known)
         for colour in self.colours:
             brackets = [_Bracket() for _ in self.rows]
             for _ in range(self.most):
@@ -171,10 +186,17 @@ class VelocityNoise:
                     break
                 self.R = R
                 system = self._with_motion(quiet)
-                estimates = self._filtered(system)
-        return Filtered(system, estimates)
+                known = None
+                estimates = self._filtered(system, known)
+        return Filtered(system, estimates) if known is None else FilteredAsKnown(system, estimates, known.gains)
 
-    def _filtered(self, system: LinearSystem) -> Estimates:
+    def _known(self, system: LinearSystem) -> Known | None:
+        """What a filter makes of a system that logs share, as long as the variance is the usual one."""
+        return system.known() if self.usual is self.R and isinstance(system, SharedSystem) else None
+
+    def _filtered(self, system: LinearSystem, known: Known | None) -> Estimates:
+        if known is not None:
+            return known.estimates_of(system.z, system.x0, "full" if self.history else "last")
         return kalman(system, history="full" if self.history else "last", innovations=True)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:

@@ -21,8 +21,19 @@ from truenorth.core.remembered import remembered
 from truenorth.errors.arm import arm_rows, slow_arm_rows, with_arm
 from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
 from truenorth.errors.matrices import MATRICES, Moments, matrices_of, smooth_moments, with_matrices, without_errors
-from truenorth.errors.staying import BG, BIASES, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
+from truenorth.errors.staying import (
+    BG,
+    BIASES,
+    PHI,
+    QUIETEST_BASE,
+    STATES,
+    Form,
+    StaticModel,
+    force_system,
+    measured_at_rest,
+)
 from truenorth.errors.sway import without_sway
+from truenorth.estimate.cells import cell_of, system_of_cell
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -156,6 +167,8 @@ class StayingLog:
         Measure the mean velocity of each interval, or the velocity gained in it.
     taken : (n,) array, optional
         Errors to take off to begin with; the prior's mean when left out.
+    shares : bool
+        Whether biases act by the attitude of a cell, where the log stays in it (:mod:`truenorth.estimate.cells`).
 
     Attributes
     ----------
@@ -181,9 +194,11 @@ class StayingLog:
         C_sb: Array | None = None,
         form: Form = "velocity",
         taken: Array | None = None,
+        shares: bool = False,
     ) -> None:
         self.record, self.C_n0_i, self.position, self.noise = record, C_n0_i, position, noise
         self.prior, self.interval, self.form, self.sways, self.C_sb = prior, interval, form, sways, C_sb
+        self.shares = shares
         self.rows: Array = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
         self.taken = (prior.mean if taken is None else taken).copy()
         self._turns = np.zeros((0, 3, MATRICES))
@@ -203,6 +218,7 @@ class StayingLog:
             C_sb=self.C_sb,
             form=self.form,
             taken=self.taken,
+            shares=self.shares,
         )
 
     @property
@@ -212,9 +228,19 @@ class StayingLog:
 
     def linearise(self) -> LinearSystem:
         """The system of the errors that are left; of the base's own motion R holds the least that it can be."""
+        if self.shares and not (self.sways or self.prior.groups):
+            cell = cell_of(self.C_n0_i, self.integrals, self.position.lat)
+            if cell is not None:
+                return self._of_cell(cell)
         blind = "rate" in self.prior.groups  # gyros that do not see the earth turn know no slow turn about the vertical
         slow = without_sway(self.integrals, self.C_sb, straight=blind) if self.sways else self.integrals
         return self._system(slow)
+
+    def _of_cell(self, cell: Array) -> LinearSystem:
+        log, C, lat, alt = self.integrals, self.C_n0_i, self.position.lat, self.position.alt
+        common = system_of_cell(cell, self.noise, self.form, log.time, lat, alt)
+        z = measured_at_rest(self.form, log, C, lat, alt)
+        return common.with_log(z, self.prior.mean - self.taken, np.ascontiguousarray(self.prior.P))
 
     def averaged(self) -> LinearSystem:
         """The same system of an IMU on an indexer, where a sway shows no error of a sensor: neither a bias nor the matrices.

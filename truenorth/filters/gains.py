@@ -6,9 +6,11 @@ cause can be followed by itself.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
@@ -21,6 +23,9 @@ from truenorth.filters.system import Estimates, LinearSystem, runs_of
 # them as they run, to the same bits.
 AT_REST = 12, 3
 BIASES, AXES = 6, 3
+
+
+T = TypeVar("T")
 
 
 class Gains(NamedTuple):
@@ -232,6 +237,32 @@ def initial_part(step: Array, P0: Array, states: slice = slice(None)) -> tuple[A
     return part, np.asarray(last @ inner @ last.T)
 
 
+class SharedGains(Gains):
+    """Gains that many logs share (:mod:`truenorth.filters.known`), with what was found of them before.
+
+    Attributes
+    ----------
+    L : (K, m, m) array
+        Of each innovation's covariance ``L L'``.
+    places, values : (E, 2) and (K, E) arrays
+        Elements of ``Phi`` that are not zero at every epoch, by row and column: most are.
+    found : dict
+        What depends on the gains alone, by whatever else decides it: it is worked out once.
+    """
+
+    L: Array
+    places: NDArray[np.int64]
+    values: Array
+    found: dict[Any, Any]
+
+    def once(self, key: Any, work: Callable[[], T]) -> T:
+        """What this work finds, found once."""
+        if key not in self.found:
+            self.found[key] = work()
+        found: T = self.found[key]
+        return found
+
+
 def through(gains: Gains, signature: Array) -> tuple[Array, Array]:
     """What a filter makes of signatures in its measurements.
 
@@ -251,6 +282,25 @@ def through(gains: Gains, signature: Array) -> tuple[Array, Array]:
     arrays = (gains.H_Phi, gains.gain, gains.Phi, signature)
     _through(*(np.ascontiguousarray(a) for a in arrays), innovation, x, np.empty_like(x))
     return innovation, x
+
+
+def factors(covariance: Array) -> Array:
+    """Lower triangles L of ``L L'`` of covariances (K, m, m): of small matrices a library takes longer to begin than to do it."""
+    L = np.zeros(covariance.shape)
+    _factor(np.ascontiguousarray(covariance), L)
+    return L
+
+
+@compiled
+def _factor(covariance: Any, L: Any) -> None:
+    """Fill L, zero so far."""
+    for k in range(len(L)):
+        for i in range(L.shape[1]):
+            for j in range(i + 1):
+                total = covariance[k, i, j]
+                for r in range(j):
+                    total -= L[k, i, r] * L[k, j, r]
+                L[k, i, j] = np.sqrt(total) if i == j else total / L[k, j, j]
 
 
 @compiled
