@@ -39,6 +39,7 @@ LEAST_LEVENBERG = (
 )
 CLOSE = 0.02  # of twice the log-likelihood: nearer than this is the maximum
 FARTHEST = 30.0  # rad: phase over the log by which a search may move a frequency
+MOST = 12.0  # by which it may move any logarithm
 
 
 def with_guess(series: Series, best: AxisMotion, guess: AxisMotion | None) -> AxisMotion:
@@ -139,11 +140,12 @@ class _Scale:
     def __init__(self, guess: AxisMotion, duration: float) -> None:
         self.orders, self.centre = parameters(guess)
         size = len(self.centre)
-        self.step, self.low, self.high = np.ones(size), np.full(size, -12.0), np.full(size, 12.0)
+        self.step, self.low, self.high = np.ones(size), np.full(size, -MOST), np.full(size, MOST)
         self.low[0] = min(math.log(QUIETEST) - self.centre[0], 0.0)
         for j, item in enumerate(guess.oscillators):
             self.step[2 + 3 * j] = 1.0 / (item.frequency * duration)
-            self.low[2 + 3 * j], self.high[2 + 3 * j] = -FARTHEST, FARTHEST
+            farthest = min(FARTHEST, MOST / self.step[2 + 3 * j])
+            self.low[2 + 3 * j], self.high[2 + 3 * j] = -farthest, farthest
             self.low[3 + 3 * j] = math.log(LEAST_DAMPING / item.damping)
             self.high[3 + 3 * j] = math.log(MOST_DAMPING / item.damping)
 
