@@ -173,3 +173,17 @@ def test_a_rate_of_one_value_with_the_arrays(save, name):
     assert record.interval == pytest.approx(0.02)
     assert record.time[0] == pytest.approx(0.02)
     assert read_imu(save(**arrays, **{name: 50.0}), rate=100.0).interval == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("names", ["gx gy gz ax ay az", "a b c d e f"], ids=["known", "unknown"])
+def test_a_clock_of_another_device_has_other_rows(save, names):
+    """The log of an aircraft keeps that of its motor next to its own, with a clock of half a second."""
+    time = np.arange(1, 801) / 50
+    rng = np.random.default_rng(5)
+    rates = 1e-3 * rng.normal(size=(800, 3)) + 0.3 * np.sin(time)[:, None]
+    forces = np.array([0.1, 0.2, 9.8]) + 1e-2 * rng.normal(size=(800, 3))
+    columns = dict(zip(names.split(), np.hstack([rates, forces]).T))
+    path = save(flight_t=time, motor_t=np.arange(20) / 2, rpm=np.arange(20) % 3, **columns)
+    record = read_imu(path, axes="RFU", units="rad/s,m/s^2")
+    np.testing.assert_allclose(record.time, time, rtol=1e-12)
+    np.testing.assert_array_equal(record.accel, forces)

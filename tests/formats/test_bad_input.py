@@ -280,3 +280,18 @@ def test_gyros_that_are_none_are_named(tmp_path):
     (tmp_path / "log.csv").write_text("t,wx,wy,wz,ax,ay,az\n" + rows)
     with pytest.raises(DataError, match="of a gyro in no usual unit"):
         read_imu(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("lacks", [1, 2, 3], ids=["a cell", "two", "three"])
+def test_a_log_that_begins_in_the_midst_of_a_row(lacks, tmp_path):
+    """A serial port is opened whenever it is: a first row without its beginning is left out, as a last one without its end."""
+    rng = np.random.default_rng(3)
+    numbers = [0.0, 0.0, 9.8, 0.0, 0.0, 0.0] + 0.01 * rng.normal(size=(400, 6))
+    rows = [",".join(f"{x:.4f}" for x in row) + f",{261906 + 10 * k}" for k, row in enumerate(numbers)]
+    whole = read_imu(csv(tmp_path, rows[1:]), axes="RFU", units="rad/s,m/s^2")
+    cut = read_imu(
+        csv(tmp_path, [",".join(rows[0].split(",")[lacks:]), *rows[1:]], "cut.csv"), axes="RFU", units="rad/s,m/s^2"
+    )
+    for key in ("time", "gyro", "accel"):
+        np.testing.assert_array_equal(getattr(cut, key), getattr(whole, key))
+    assert any("no whole row left out: 1, the first is line 1" in guess.value for guess in cut.taken_for)

@@ -132,6 +132,22 @@ def test_a_clock_of_hours_minutes_and_seconds(tmp_path):
     is_read(path, rate=100.0)
 
 
+def test_the_time_since_startup_where_a_receiver_had_no_time_yet(tmp_path):
+    """A VectorNav's own export: GPS time is empty until there are satellites, and the device counts from its start."""
+    path = tmp_path / "log.csv"
+    gps = ["" if k < len(MOVED.time) // 3 else f"{403575.0 + t:.6f}" for k, t in enumerate(MOVED.time)]
+    lines = rows(MOVED.time, MOVED.gyro, MOVED.accel).strip().splitlines()
+    header = (
+        "TimeStartup [ns],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],accel_x [m/s^2],accel_y [m/s^2],accel_z [m/s^2]"
+    )
+    count = [f"{1e9 * t:.0f}," + line.split(",", 1)[1] for t, line in zip(MOVED.time, lines, strict=True)]
+    path.write_text(
+        "\n".join([f"Time [s],{header}", *(",".join(pair) for pair in zip(gps, count, strict=True))]) + "\n"
+    )
+    record = is_read(path)
+    assert next(guess.value for guess in record.taken_for if guess.what == "time") == "TimeStartup [ns]"
+
+
 def test_seconds_past_sixty_are_seconds(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time,wx,wy,wz,ax,ay,az\n" + rows(101112.0 + MOVED.time, MOVED.gyro, MOVED.accel, form="%.12g"))

@@ -155,3 +155,23 @@ def test_a_first_row_that_is_no_whole_row_is_counted(read):
     record = read([HEADER, "0.01,1e-6", *ROWS[1:]])
     assert len(record.time) == len(ROWS) - 1
     assert "no whole row left out: 1, the first is line 2" in notes(record)
+
+
+def said(k, end, mark=","):
+    """A row next to what a device said in it, whose own line end stands in the cell."""
+    return mark.join([ROWS[k].replace(",", mark), f'"$VNYMR,+0{k}.1,-2.5*63{end}"'])
+
+
+@pytest.mark.parametrize(("end", "mark"), [("\r\n", ","), ("\n", ","), ("\r\n", ";"), ("\r\n", "\t")])
+def test_a_line_end_inside_a_quoted_cell_is_no_end_of_a_row(read, end, mark):
+    """A script writes the line that a VectorNav sent next to its numbers, with the line end that the device sends."""
+    record = read([HEADER.replace(",", mark) + f"{mark}raw", *(said(k, end, mark) for k in range(len(ROWS)))])
+    assert same(record, read([HEADER, *ROWS]))
+    assert f"quoted cells that end with the end of a line: {len(ROWS)}" in notes(record)
+
+
+def test_an_open_quote_is_no_cell_that_ends_with_a_line(read):
+    """The next line's quote belongs to another cell: nothing is joined, and the row is mended as before."""
+    record = read(changed(9, at(ROWS[9], 6, '"{}')))
+    assert same(record, read([HEADER, *ROWS]))
+    assert NOTE in notes(record)

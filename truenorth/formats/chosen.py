@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -74,6 +75,7 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     if columns.named and _of_two_columns(columns, names, choice):
         return choice
     steady = {name: scatter for name in clocks if (scatter := _scatter(columns, name)) is not None}
+    steady = {name: steady[name] for name in _as_long(columns, choice, list(steady))}
     plainly = {name: scatter for name, scatter in steady.items() if is_plain_clock(name)}
     steady = plainly or steady
     if steady:
@@ -140,6 +142,19 @@ def _scatter(columns: Columns, name: str) -> float | None:
     return float(np.sqrt(np.mean((near / median - 1.0) ** 2)))
 
 
+def _as_long(columns: Columns, choice: Choice, clocks: list[str]) -> list[str]:
+    """Those clocks that have a row for each of the sensors': a file of arrays holds those of other devices too.
+
+    Where the sensors are not known yet, as many rows as most columns have; all clocks where none has.
+    """
+    lengths = {name: len(columns.column(name)) for name in clocks}
+    if len(set(lengths.values())) < 2:
+        return clocks
+    sensors = [name for name, _ in choice.sensors] or list(columns.names[:MOST_COLUMNS])
+    ((rows, _),) = Counter(len(columns.column(name)) for name in sensors).most_common(1)
+    return [name for name in clocks if lengths[name] == rows] or clocks
+
+
 def _stands(columns: Columns, name: str) -> bool:
     """Whether a clock has one value in all rows, as that of a receiver without satellites: it is no clock."""
     try:
@@ -158,7 +173,7 @@ def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names:
             steps = np.diff(columns.clock(name)[0])
             counts = np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name)
             found.append((name, bool(counts)))
-    clocks = [name for name, counts in found if not counts]
+    clocks = _as_long(columns, choice, [name for name, counts in found if not counts])
     if len(clocks) == 1:
         choice.time = (clocks[0],)
         choice.guesses.append(

@@ -37,9 +37,9 @@ NOT_FORCE = ("free", "user", "gravity", "mag")  # accelerations without gravity,
 AXES = {"x": "x", "y": "y", "z": "z"}
 ROLL_RATES = {"p": "x", "q": "y", "r": "z"}  # of aircraft
 CLOCK = re.compile(
-    r"(?:(?:imu|gps|gnss|utc|unix|epoch|posix|ros|logging|location|system|sys|sample|device|sensor|host|pc|log|rec|header|field|elapsed|mono|"
+    r"(?:(?:imu|gps|gnss|utc|unix|epoch|posix|ros|time|logging|location|system|sys|sample|device|sensor|host|pc|log|rec|header|field|elapsed|mono|"
     r"monotonic|recv|receive|start|loggingtime|locationtime|of|since|relative|boot|offset|itow|sow|seconds|motion|accelerometer|gyro)_?)*"
-    r"(?:time(?:_?stamp|_?of_?week|_?of_?day|_?boot|_?fine)?|t|stamp|timestamp|ts|tow|itow|sow|clock|epoch|seconds?|secs?|"
+    r"(?:time(?:_?stamp|_?of_?week|_?of_?day|_?boot|_?startup|_?fine)?|t|stamp|timestamp|ts|tow|itow|sow|clock|epoch|seconds?|secs?|"
     r"sampletimefine|datetime|date_?time|utc|elapsed|seconds_elapsed|timestamp_unix)"
     r"(?:_(?P<unit>s|ms|us|ns|secs?|msecs?|usecs?|nsecs?|seconds?|millis(?:econds)?|micros(?:econds)?|nanos(?:econds)?|since_?1970|since_?reboot))?"
 )

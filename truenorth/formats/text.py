@@ -20,7 +20,7 @@ from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.content import REMARKS_BYTES, text_of
 from truenorth.formats.dialect import DELIMITERS, EITHER, SAMPLE, Dialect, dialect_of, is_remark, with_points
-from truenorth.formats.quotes import without_outer_quotes, without_stray_quotes
+from truenorth.formats.quotes import without_ends_in_quotes, without_outer_quotes, without_stray_quotes
 from truenorth.records import Record
 
 if TYPE_CHECKING:
@@ -193,6 +193,7 @@ def open_table(path: Path) -> TextTable:
         No line of numbers, lines that fit no dialect, or a header of another number of columns.
     """
     text, note = text_of(path)
+    text, joined = without_ends_in_quotes(text)
     text = _with_stamps_apart(without_outer_quotes(text))
     head = _head(path, text)
     if not head:
@@ -204,7 +205,7 @@ def open_table(path: Path) -> TextTable:
     head = _head(path, text) if mended else head
     rows = [not is_remark(line) and _are_row(dialect, dialect.cells(line), count) for _, line in head]
     first = rows.index(True) if any(rows) else None
-    notes = tuple(said for said in (note, mended) if said is not None)
+    notes = tuple(said for said in (note, joined, mended) if said is not None)
     if first is None:
         return _without_rows(path, text, head, notes)
     names, used = _header(path, dialect, head[:first], count, first_cells=dialect.cells(head[first][1]))
@@ -292,10 +293,12 @@ def _header(
             if len(names) == count and not all(map(dialect.is_number, names)):
                 break
         else:
+            cells = dialect.cells(line)
             listed = dialect.delimiter is not None and not is_remark(line) and k == len(above) - 1
-            if listed and len(dialect.cells(line)) >= max(3, count // 2):
+            # Numbers alone are no header but a row that lacks its beginning: a logger that was switched on in its midst.
+            if listed and len(cells) >= max(3, count // 2) and not all(map(dialect.is_number, cells)):
                 raise DataError(
-                    f"{path.name}: line {above[k][0]}: a header of {len(dialect.cells(line))} columns above rows of {count}; "
+                    f"{path.name}: line {above[k][0]}: a header of {len(cells)} columns above rows of {count}; "
                     "expected as many of each: if commas stand both between columns and in decimals, write the log with "
                     "another separator"
                 )
