@@ -1,7 +1,7 @@
 """Rows far noisier than specified, on a base that sways: sigma by as much of that noise as the log allows.
 
 White noise is as dense under the sway as above it; a vibration that looks white is not, nor is what rounding a motion leaves. Above
-the sway a spectrum shows how noisy the rows are. Under it the likelihood of the log rules out more noise than that, and little else:
+the sway a spectrum shows how noisy the rows are. Under it the likelihood of the log rules out more noise than that, no less:
 gyros 24 times as noisy as said make a log with a sway of degrees as likely. So such a log is filtered again with the noise of its
 rows, halved until the log allows it, and by as much as sigma is larger then, and the answer another, it is unsure.
 """
