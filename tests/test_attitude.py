@@ -85,6 +85,12 @@ def test_rotation_vectors_as_scipy(v, scale):
         np.testing.assert_allclose(attitude.rotation_vector_from_dcm(C), scale * v, atol=1e-14, rtol=1e-13)
 
 
+@given(vectors, st.sampled_from([0.0, 1e-13, 1e-5, 1.0, np.pi]))
+def test_one_rotation_vector_is_to_the_bit_that_of_a_stack(v, scale):
+    C = attitude.dcm_from_rotation_vector(scale * v)
+    assert np.array_equal(attitude.rotation_vector_from_dcm(C), attitude.rotation_vector_from_dcm(C[None])[0])
+
+
 @given(unit_quaternions)
 def test_quaternions_as_scipy(q):
     C = attitude.dcm_from_quaternion(q)

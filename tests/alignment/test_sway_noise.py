@@ -46,3 +46,16 @@ def test_a_ship_that_moves_slowly_in_many_tones_has_the_gyros_that_she_says(run)
     outcome = aligned(moored, "navigation", 400.0)(1, run)
     assert outcome.refused == ""
     assert max(float(np.abs(x).max()) for x in outcome.ratios.values()) < 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("loud", [False, True])
+def test_rows_louder_than_specified_are_in_sigma_where_the_log_does_not_rule_them_out(loud):
+    """Gyros rounded to 300 of their noise: the log of a sway allows 1 to 24 times; heading was 5.5 sigmas off, `aligned`."""
+    inputs, truth = BENCHES["swaying"].draw(5332, 2)
+    if loud:
+        spoil = next(item.apply for item in FAULTS if item.name == "coarse quantum")
+        inputs, _ = spoil(inputs, np.random.default_rng([5332, 2, crc32(b"swaying coarse quantum")]))
+    answer = align(inputs["record"], inputs["place"], inputs["imu"])
+    assert bool(_said(answer) & {"specification.gyro_rows"}) == loud
+    assert max(float(np.abs(x).max()) for x in misses(answer, truth).values()) < 3.0

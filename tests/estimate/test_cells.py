@@ -54,6 +54,15 @@ def test_what_is_put_in_its_place_is_not_known():
     assert shared.with_arrays(Q=2.0 * system.Q).known() is None
 
 
+def test_noise_with_more_variance_is_one_array_for_all_logs():
+    system = LinearSystem(*[np.eye(2)[None]] * 4, np.zeros((5, 2)), np.zeros(2), np.eye(2))
+    common = Common(system)
+    R = common.noise_with(np.array([1.0, 2.0]))
+    assert np.array_equal(R, system.R + np.diag([1.0, 2.0]))
+    assert common.noise_with(np.array([1.0, 2.0])) is R
+    assert common.known_with(R, system.P0) is common.known_with(R.copy(), system.P0)
+
+
 @pytest.mark.parametrize("heading", [0.0, 37.0, 179.0])
 def test_cell_is_near_and_of_its_log_alone(heading):
     log = integrate(record_of(heading, 1))

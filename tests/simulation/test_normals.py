@@ -46,8 +46,9 @@ def test_a_stream_begins_as_numpy_begins_it(numbers_of_stream):
     found, expected = normals_at(*numbers_of_stream), normals_of(stream(*numbers_of_stream))
     assert np.array_equal(found.state, expected.state)
     assert np.array_equal(found.factors, expected.factors)
-    first = stream(*numbers_of_stream).standard_normal((3, 3))
-    assert np.array_equal(first_normals((3, 3), *numbers_of_stream), first)
+    *key, last = numbers_of_stream
+    first = [stream(*key, number).standard_normal(300) for number in (last, last + 1)]
+    assert np.array_equal(first_normals(300, [last, last + 1], *key), first)
 
 
 def test_a_stream_has_no_negative_numbers():

@@ -10,6 +10,7 @@ from truenorth.alignment.coloured import weighed_by_colour
 from truenorth.alignment.drift import Drift, detect_drift, drift_signatures
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
+from truenorth.alignment.loud_rows import loud_rows_evidence
 from truenorth.alignment.masked import masked_evidence
 from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.sway_noise import sway_noise_evidence
@@ -53,5 +54,7 @@ def what_begins(
     if isinstance(fine, SwayAlignment):
         elsewhere = fine.misfit_at
         steps += [*fine.begun, *([] if fine.slow_arm is None else [swing_note(fine.motion)])]
-        steps += sway_noise_evidence(fine.noisier, spec, position.lat) if given else []
+        steps += (
+            [*sway_noise_evidence(fine.noisier, spec, position.lat), *loud_rows_evidence(fine, spec)] if given else []
+        )
     return detect_drift(fine, drift), steps, hemisphere_evidence(gravity, fine, position, elsewhere, given=given)

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.alignment.slow_sway import is_slow
 from truenorth.errors.staying import QUIETEST_BASE, StaticModel
@@ -29,6 +30,8 @@ from truenorth.quality.floor import FASTEST, white_floor
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
+
+Array = NDArray[np.float64]
 
 # Of the random walks as specified: below, at and above those of another sensor
 FACTORS = tuple(k * limit("another sensor") for k in (0.5, 1.0, 2.0, 4.0, 8.0))
@@ -115,16 +118,28 @@ def _loud_above_sway(log: StayingLog) -> dict[str, float]:
     Of channels that do not look white there, by the floor between the lines of what shakes them: near the sway, since above it a
     filter in the device may take noise away, and rounding adds to it.
     """
+    white = white_above_sway(log)
+    if white is not None:
+        return white
+    near, all_through = (white_floor(log.record, fastest) for fastest in (NEAR_SWAY, FASTEST))
+    return _times_said(log, np.nan_to_num(np.where(np.isfinite(near), near, all_through), nan=math.inf))
+
+
+def white_above_sway(log: StayingLog) -> dict[str, float] | None:
+    """How many times louder than specified each sensor is above the sway, if all channels look white there."""
     _, density = noise_densities(log.record)
-    if np.isfinite(density).any(axis=0).all():
-        usual = np.nanmedian(density, axis=0)
-    else:
-        near, all_through = (white_floor(log.record, fastest) for fastest in (NEAR_SWAY, FASTEST))
-        usual = np.nan_to_num(np.where(np.isfinite(near), near, all_through), nan=math.inf)
+    if not np.isfinite(density).any(axis=0).all():
+        return None
+    return _times_said(log, np.nanmedian(density, axis=0))
+
+
+def _times_said(log: StayingLog, density: Array) -> dict[str, float]:
+    """Of densities (6,), by the worst axis of each sensor."""
     said = asdict(log.noise)
     channels = {"gyro": slice(0, 3), "accel": slice(3, 6)}
     return {
-        sensor: float(usual[channels[sensor]].max()) / max(said[f"{sensor}_random_walk"], 1e-300) for sensor in SENSORS
+        sensor: float(density[channels[sensor]].max()) / max(said[f"{sensor}_random_walk"], 1e-300)
+        for sensor in SENSORS
     }
 
 

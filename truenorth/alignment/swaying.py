@@ -161,7 +161,7 @@ def swinging(plain: SwayAlignment, start: CoarseStart, mount: Mount, turned: Imu
         That it was made of.
     """
     log, position = plain.about, start.position
-    if not may_swing(plain, plain.motion, position, plain.suspect):
+    if not may_swing(plain, position, plain.suspect):
         return plain
     prior = _prior(start, mount, turned, ARM)
     on_lines = StayingLog(

@@ -26,17 +26,15 @@ from truenorth.state.limits import limit, may_be_chance
 PARAMETERS = 6  # frequency and size of two lines, two components of the arm
 
 
-def may_swing(
-    fine: FineAlignment, motion: Sequence[AxisMotion], position: Position, suspect: Callable[[], bool]
-) -> bool:
-    """Whether a swing is worth asking for: something looks as if it had begun, of a motion that is suspect or goes slowly.
+def may_swing(fine: FineAlignment, position: Position, suspect: Callable[[], bool]) -> bool:
+    """Whether a swing is worth asking for: something looks as if it had begun, or the motion is suspect.
 
-    What takes longer to know, whether it is suspect, is asked last.
+    Whether a part of the motion goes slowly is not asked: both oscillators of an axis may be the sea's, and the swing is then what
+    looks as if it had begun. What takes longer to know, whether the motion is suspect, is asked last.
     """
     if not long_enough(float(fine.integrals.time[-1])):
         return False
-    slow = any(is_swing(item) for axis in motion[:2] for item in axis.oscillators)
-    return (slow and not may_be_chance(_likeliest(fine, position))) or suspect()
+    return not may_be_chance(_likeliest(fine, position)) or suspect()
 
 
 def swings(

@@ -34,7 +34,8 @@ Array = NDArray[np.float64]
 LONGEST = 200.0  # s: longer is no spring to a quay
 FEWEST = 2.0  # periods in a log: of one that goes round less often nobody sees that it comes back
 CELL = 0.8  # rad: phase over the log from one frequency that is tried to the next
-ROUNDS = 2  # sea and line, each with the other known
+ROUNDS = 2  # sea and lines, each with the other known
+MOST_SLOW = 2  # lines besides the swing's, that are no sea
 AROUND = 10  # cells on either side of a frequency, of a third each, then finer by as much
 FINER, LEVELS = 5.0, 3
 DAMPING = 1e-10  # of a line
@@ -71,68 +72,84 @@ def fit_swing(
     """
     duration = interval * len(system.z)
     low, high = 2.0 * math.pi * max(FEWEST / duration, 1.0 / LONGEST), 2.0 * math.pi / SLOWEST_SEA
-    spacing = CELL / duration
-    grid = np.arange(low, high, spacing)  # of one frequency where the log is just long enough
-    seas, lines = [], np.zeros(2)
+    grid = np.arange(low, high, CELL / duration)  # of one frequency where the log is just long enough
+    seas, levels = [_without_swings(axis) for axis in plain[:2]], []
     for axis in (0, 1):
         U, size, _ = np.linalg.svd(turns[:, axis], full_matrices=False)
-        level = _Level(system.z[:, axis], interval, walks, U[:, size * ARM > LEAST_TURN * math.sqrt(len(U))])
-        sea = AxisMotion(plain[axis].white, tuple(item for item in plain[axis].oscillators if not is_swing(item)))
-        for _ in range(ROUNDS):
-            lines[axis] = level.line(sea, grid, spacing)
-            sea = level.sea(sea, lines[axis])
-        seas.append(sea)
-    items = _together(system, interval, (*seas, plain[2]), lines, (low, high))
+        slow = U[:, size * ARM > LEAST_TURN * math.sqrt(len(U))]
+        levels.append(_Level(system.z[:, axis], interval, walks, slow))
+    for _ in range(ROUNDS):
+        lines = _Lines(system, interval, (*seas, plain[2])).likeliest(grid)
+        seas = [level.sea(sea, line) for level, sea, line in zip(levels, seas, lines, strict=True)]
+    found = _Lines(system, interval, (*seas, plain[2]))
+    items = found.items(found.likeliest(grid))
     moving = [AxisMotion(sea.white, (*sea.oscillators, item)) for sea, item in zip(seas, items, strict=True)]
     return (*moving, plain[2])
+
+
+def _without_swings(motion: AxisMotion) -> AxisMotion:
+    return AxisMotion(motion.white, tuple(item for item in motion.oscillators if not is_swing(item)))
 
 
 class _Level:
     """The velocity along a level axis, and what the slow part of the heading makes of it (K, p)."""
 
     def __init__(self, z: Array, interval: float, walks: Walks, slow: Array) -> None:
-        self.given = z, interval, walks
-        self.slow, self.series = slow, Series(*self.given, slow)
-
-    def line(self, sea: AxisMotion, grid: Array, spacing: float) -> float:
-        """The frequency that gains most besides the sea, rad/s, of a grid and finer and finer about it."""
-        near = float(grid[np.argmax(self.series.lines(sea, grid)[0])])
-        for _ in range(LEVELS):
-            cells = near + spacing * np.linspace(-1.0, 1.0, 2 * AROUND + 1)
-            near, spacing = float(cells[np.argmax(self.series.lines(sea, cells)[0])]), spacing / FINER
-        return near
+        self.given, self.slow = (z, interval, walks), slow
+        self.lags = Series(*self.given).lags
 
     def sea(self, guess: AxisMotion, line: float) -> AxisMotion:
-        """The sea besides a line."""
-        phase = line * self.series.lags
-        calm = Series(*self.given, np.column_stack([self.slow, np.cos(phase), np.sin(phase)]))
-        most = MOST_OSCILLATORS[0]
-        return min([search(calm, most), search(calm, most, guess)], key=calm.score)
+        """The sea besides a line, and besides what else is as slow: sensors that an indexer turns make lines of their own."""
+        slow, most = [line], MOST_OSCILLATORS[0]
+        while True:
+            waves = [wave for w in slow for wave in (np.cos(w * self.lags), np.sin(w * self.lags))]
+            calm = Series(*self.given, np.column_stack([self.slow, *waves]))
+            sea = min([search(calm, most), search(calm, most, guess)], key=calm.score)
+            more = [item.frequency for item in sea.oscillators if is_swing(item)]
+            if not more or len(slow) > MOST_SLOW:
+                return _without_swings(sea)
+            slow.append(more[0])
 
 
-def _together(
-    system: LinearSystem, interval: float, seas: Sequence[AxisMotion], lines: Array, bounds: tuple[float, float]
-) -> list[Oscillator]:
-    """The lines along both level axes that make the log likeliest, one after the other and finer and finer."""
-    lines = lines.copy()
-    full = with_motion(system, interval, seas)
-    estimates = kalman(full, history="full")
-    gains = filter_gains(full, estimates)
-    L: Array = np.asarray(np.linalg.cholesky(estimates.innovation_covariance), dtype=np.float64)
-    nu = whitened(L, estimates.innovation[..., None]).ravel()
-    t: Array = interval * (np.arange(len(system.z), dtype=np.float64) + 0.5)
-    spacing = CELL / float(t[-1]) / 3.0
-    for _ in range(LEVELS):
+class _Lines:
+    """Lines along both level axes besides the sea, with all that the filter of the whole log estimates left open.
+
+    Of an indexer the errors of its sensors are as slow as a swing: what is known of them keeps the two apart.
+    """
+
+    def __init__(self, system: LinearSystem, interval: float, seas: Sequence[AxisMotion]) -> None:
+        full = with_motion(system, interval, seas)
+        estimates = kalman(full, history="full")
+        self.gains = filter_gains(full, estimates)
+        self.L: Array = np.asarray(np.linalg.cholesky(estimates.innovation_covariance), dtype=np.float64)
+        self.nu = whitened(self.L, estimates.innovation[..., None]).ravel()
+        self.t: Array = interval * (np.arange(len(system.z), dtype=np.float64) + 0.5)
+
+    def likeliest(self, grid: Array) -> Array:
+        """(2,) frequencies that make the log likeliest, rad/s: of a grid, one after the other, and finer and finer about them."""
+        every = [self._made(axis, grid) for axis in (0, 1)]
+        best, other = [0, 0], np.zeros((len(self.nu), 0))
         for axis in (0, 1, 0, 1):
-            cells = np.clip(lines[axis] + spacing * np.arange(-AROUND, AROUND + 1), *bounds)
-            other = _whitened(gains, L, t, 1 - axis, lines[1 - axis : 2 - axis])
-            columns = _whitened(gains, L, t, axis, cells)
-            lines[axis] = cells[np.argmax(_gained(columns, other[:, 0], nu))]
-        spacing /= FINER
-    both = np.concatenate([_whitened(gains, L, t, axis, lines[axis : axis + 1])[:, 0] for axis in (0, 1)], axis=1)
-    size = np.linalg.lstsq(both, nu, rcond=None)[0].reshape(2, 2)
-    sigma = np.sqrt(0.5 * np.sum(size**2, axis=1))
-    return [Oscillator(1, float(s), float(w), DAMPING) for s, w in zip(sigma, lines, strict=True)]
+            best[axis] = int(np.argmax(_gained(every[axis], other, self.nu)))
+            other = every[axis][:, best[axis]]
+        lines, spacing = grid[best], CELL / float(self.t[-1]) / 3.0
+        for _ in range(LEVELS):
+            for axis in (0, 1, 0, 1):
+                cells = np.clip(lines[axis] + spacing * np.arange(-AROUND, AROUND + 1), grid[0], grid[-1])
+                other = self._made(1 - axis, lines[1 - axis : 2 - axis])[:, 0]
+                lines[axis] = cells[np.argmax(_gained(self._made(axis, cells), other, self.nu))]
+            spacing /= FINER
+        return np.asarray(lines)
+
+    def items(self, lines: Array) -> list[Oscillator]:
+        """Lines of these frequencies (2,), as large as they are."""
+        both = np.concatenate([self._made(axis, lines[axis : axis + 1])[:, 0] for axis in (0, 1)], axis=1)
+        size = np.linalg.lstsq(both, self.nu, rcond=None)[0].reshape(2, 2)
+        sigma = np.sqrt(0.5 * np.sum(size**2, axis=1))
+        return [Oscillator(1, float(s), float(w), DAMPING) for s, w in zip(sigma, lines, strict=True)]
+
+    def _made(self, axis: int, frequencies: Array) -> Array:
+        return _whitened(self.gains, self.L, self.t, axis, frequencies)
 
 
 def _whitened(gains: Gains, L: Array, t: Array, axis: int, frequencies: Array) -> Array:
@@ -144,7 +161,7 @@ def _whitened(gains: Gains, L: Array, t: Array, axis: int, frequencies: Array) -
 
 
 def _gained(columns: Array, other: Array, nu: Array) -> Array:
-    """(m,) squares of `nu` (N,) that pairs of columns (N, m, 2) explain, besides those (N, 2) of another line."""
+    """(m,) squares of `nu` (N,) that pairs of columns (N, m, 2) explain, besides those (N, 0 or 2) of another line."""
     Q = np.linalg.qr(other)[0]
     nu = nu - Q @ (Q.T @ nu)
     columns = columns - np.einsum("ia,aml->iml", Q, np.einsum("ia,iml->aml", Q, columns))

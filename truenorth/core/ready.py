@@ -21,7 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-import numpy as np
+from numpy import ndarray
 
 from truenorth.core import processor
 from truenorth.core.fingerprint import UnknownValueError, fingerprints_of_call
@@ -41,7 +41,7 @@ LAYOUTS = [flags & ~BY_COLUMNS if flags & IN_ORDER else flags for flags in range
 def kind_of(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
     """What machine code depends on of arguments; quick, and of this process."""
     return tuple([
-        (a.dtype, a.ndim, LAYOUTS[a.flags.num & FLAGS]) if type(a) is np.ndarray
+        (a.dtype, a.ndim, LAYOUTS[a.flags.num & FLAGS]) if type(a) is ndarray
         else (type(a), kind_of(a)) if isinstance(a, tuple)
         else type(a)
         for a in arguments

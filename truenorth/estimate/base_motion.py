@@ -200,6 +200,8 @@ class VelocityNoise:
         return kalman(system, history="full" if self.history else "last", innovations=True)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
+        if self.usual is self.R and self.whole and isinstance(quiet, SharedSystem) and quiet.common is not None:
+            return quiet.with_made(R=quiet.common.noise_with(self.R[0] - QUIETEST_BASE**2))
         own = self.R[:1] if self.whole else self.R
         R, more = np.empty((len(self.R), 3, 3)), np.zeros((len(own), 3, 3))
         more.reshape(len(more), -1)[:, ::4] = own - QUIETEST_BASE**2  # its diagonal

@@ -71,6 +71,7 @@ class Common:
     def __init__(self, system: LinearSystem) -> None:
         self.system = system
         self._known: dict[tuple[bytes, bytes], Known] = {}
+        self._noises: dict[bytes, tuple[Array, bytes]] = {}  # noise with so much more variance, and its bytes
 
     def with_log(self, z: Array, x0: Array, P0: Array) -> SharedSystem:
         """The system with what a log measured."""
@@ -79,9 +80,22 @@ class Common:
         shared.__dict__.update(own.__dict__ | {"z": z, "x0": x0, "P0": P0, "common": self})
         return shared
 
+    def noise_with(self, variance: Array) -> Array:
+        """``R`` (K, m, m) with more variance (m,) on its diagonal; one array for all logs, to which nobody writes."""
+        key = variance.tobytes()
+        there = self._noises.get(key)
+        if there is None:
+            if len(self._noises) >= MOST_KNOWN:
+                self._noises.clear()
+            R = self.system.R + np.diag(variance)
+            there = self._noises[key] = R, R.tobytes()
+        return there[0]
+
     def known_with(self, R: Array, P0: Array) -> Known:
         """What a filter makes of it."""
-        key = R.tobytes(), P0.tobytes()
+        # Bytes that are the same object are not compared, and their hash is known.
+        own = next((there for noise, there in tuple(self._noises.values()) if noise is R), None)
+        key = R.tobytes() if own is None else own, P0.tobytes()
         known = self._known.get(key)
         if known is None:
             known = Known(self.system.with_made(R=R, P0=P0))

@@ -300,16 +300,27 @@ def box_mean(signal: Array, width: int) -> Array:
 
 def _neighbours(signal: Array, count: int) -> Array:
     """(k, m - count + 1) sums of so many neighbours; twice as many at a time, so that no large sum is taken from another."""
-    length = signal.shape[1] - count + 1
-    total, done, sums, width = np.zeros((len(signal), length)), 0, signal, 1
-    while True:
-        if count & width:
-            total += sums[:, done : done + length]
-            done += width
-        if done == count:
-            return total
-        sums = sums[:, :-width] + sums[:, width:]
-        width *= 2
+    total = np.zeros((len(signal), signal.shape[1] - count + 1))
+    _add_neighbours(np.array(signal, order="C"), count, total)
+    return total
+
+
+@compiled
+def _add_neighbours(sums: Any, count: int, total: Any) -> None:
+    """Add to zeros (k, m - count + 1) :func:`_neighbours` of `sums` (k, m), which become sums of twice as many at each step."""
+    for i in range(sums.shape[0]):
+        done, width, last = 0, 1, sums.shape[1]
+        while True:
+            if count & width:
+                for k in range(total.shape[1]):
+                    total[i, k] += sums[i, done + k]
+                done += width
+            if done == count:
+                break
+            last -= width
+            for k in range(last):
+                sums[i, k] += sums[i, k + width]
+            width *= 2
 
 
 # ------------------------------------------------------------------------------------------- classification

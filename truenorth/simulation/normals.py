@@ -12,6 +12,7 @@ layers and the order of draws of NumPy; M. O'Neill, "Developing a seed_seq alter
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from operator import index
 from typing import Any, NamedTuple
@@ -79,21 +80,27 @@ def normals_of(rng: np.random.Generator) -> Normals:
 
 def normals_at(seed: int, *key: int) -> Normals:
     """The numbers of :func:`truenorth.simulation.streams.stream`, which takes five times as long to begin."""
+    ahead, scale, most, height, tail = _tables()
+    state, factors = np.empty(2, dtype=np.uint64), np.empty((4, BLOCK + 1), dtype=np.uint64)
+    _start(np.array(_key_of(seed, *key), dtype=np.uint64), ahead, state, factors)
+    return Normals(state, factors, np.empty(BLOCK, dtype=np.uint64), np.array([BLOCK, 0]), scale, most, height, tail)
+
+
+def first_normals(count: int, streams: Sequence[int], seed: int, *key: int) -> NDArray[np.float64]:
+    """So many first numbers (S, count) of each of several streams, whose keys end in these numbers of one word."""
+    words = np.array([_key_of(seed, *key, number) for number in streams], dtype=np.uint64)
+    found = np.empty((len(streams), count))
+    _draw_first(words, *_tables(), found)
+    return found
+
+
+def _key_of(seed: int, *key: int) -> list[int]:
+    """Words of 32 bits of all numbers, those of the seed four at least."""
     words = [*_words_of(seed)]
     words += [0] * (POOL - len(words))
     for number in key:
         words += _words_of(number)
-    ahead, scale, most, height, tail = _tables()
-    state, factors = np.empty(2, dtype=np.uint64), np.empty((4, BLOCK + 1), dtype=np.uint64)
-    _start(np.array(words, dtype=np.uint64), ahead, state, factors)
-    return Normals(state, factors, np.empty(BLOCK, dtype=np.uint64), np.array([BLOCK, 0]), scale, most, height, tail)
-
-
-def first_normals(shape: tuple[int, ...], seed: int, *key: int) -> NDArray[np.float64]:
-    """The first numbers of a stream, as many as an array of this shape holds."""
-    found = np.empty(shape)
-    draw(normals_at(seed, *key), found.reshape(-1))
-    return found
+    return words
 
 
 @lru_cache(maxsize=256, typed=True)
@@ -268,3 +275,14 @@ def draw(normals: Normals, out: Any) -> None:
             if taken:
                 out[done] = value
                 done += 1
+
+
+@compiled
+def _draw_first(words: Any, ahead: Any, scale: Any, most: Any, height: Any, tail: Any, found: Any) -> None:
+    """:func:`first_normals` of the words (S, W) of their keys; one stream stands where the one before it stood."""
+    state, factors = np.empty(2, dtype=np.uint64), np.empty((4, BLOCK + 1), dtype=np.uint64)
+    block, at = np.empty(BLOCK, dtype=np.uint64), np.empty(2, dtype=np.int64)
+    for i in range(len(words)):
+        _start(words[i], ahead, state, factors)
+        at[0], at[1] = BLOCK, 0
+        draw(Normals(state, factors, block, at, scale, most, height, tail), found[i])

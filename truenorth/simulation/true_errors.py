@@ -11,6 +11,7 @@ where one value means all three axes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -40,6 +41,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "bias_temperature": (3,),
     "scale_factor_temperature": (3,),
 }
+MOST = max(math.prod(shape) for shape in SHAPES.values())  # numbers of a term
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +158,9 @@ def drawn_errors(
         known = [f"{group}_{term}" for group in GROUPS for term in SHAPES if term in KEYS[group]]
         values = {name: _given(name, value, known) for name, value in given.items()}
     terms: dict[str, dict[str, Any]] = {group: {} for group in GROUPS}
+    drawn = [name for _, _, name, sigma in _sigmas_of(spec) if name not in values and sigma != 0.0]
+    numbers = first_normals(MOST, [STREAMS[name] for name in drawn], seed, scenario, run) if drawn else np.empty((0, 0))
+    normals = dict(zip(drawn, numbers, strict=True))
     for group, term, name, sigma in _sigmas_of(spec):
         shape = SHAPES[term]
         if name in values:
@@ -163,7 +168,7 @@ def drawn_errors(
         elif sigma == 0.0:
             terms[group][term] = np.zeros(shape)
         else:
-            terms[group][term] = draw = sigma * first_normals(shape, seed, scenario, run, STREAMS[name])
+            terms[group][term] = draw = sigma * normals[name][: math.prod(shape)].reshape(shape)
             if term == "misalignment":
                 draw.reshape(-1)[:: shape[1] + 1] = 0.0
     return TrueErrors(*(SensorErrors(**terms[group]) for group in GROUPS))

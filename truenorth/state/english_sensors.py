@@ -117,6 +117,16 @@ OF_SENSORS = {
         "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:imu}) says "
         "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
     ),
+    "specification.gyro_rows": (
+        "above the sway the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "
+        "{said:deg/sqrt(h)|}; under it the log allows {allowed:deg/sqrt(h)|}: heading errs by {heading:angle} more, level by "
+        "{level:angle}"
+    ),
+    "specification.accel_rows": (
+        "above the sway the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:imu}) "
+        "says {said:ug/sqrt(Hz)|}; under it the log allows {allowed:ug/sqrt(Hz)|}: heading errs by {heading:angle} more, level by "
+        "{level:angle}"
+    ),
     "specification.noisier": (
         "the white noise of the rows (gyros {gyro:deg/sqrt(h)|} deg/sqrt(h), accelerometers {accel:ug/sqrt(Hz)|} ug/sqrt(Hz)) is "
         "far more than the specification ({imu:imu}) says: a vehicle that vibrates, or another sensor; the answer counts it, and "
