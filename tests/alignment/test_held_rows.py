@@ -82,8 +82,8 @@ def test_it_is_navigated(van, how):
     best, found = (tn.navigate(log, start, aid=aid, imu="industrial") for log in (record, held))
     assert found.status == best.status == "navigated", found.reasons
     assert "record.repeated_rows" in [item.key for item in found.evidence]
-    e = found.track.euler[-1] - np.array(true(found.track.time[-1]))
-    assert np.all(np.abs((e + np.pi) % (2.0 * np.pi) - np.pi) < 4.0 * found.track.euler_sigma[-1])
+    e = found.euler[-1] - np.array(true(found.time[-1]))
+    assert np.all(np.abs((e + np.pi) % (2.0 * np.pi) - np.pi) < 4.0 * found.euler_sigma[-1])
     assert np.all(found.track.sigma[-1, :3] < 1.3 * best.track.sigma[-1, :3])
 
 
