@@ -20,7 +20,7 @@ def test_rows_of_a_simulation_at_rest_repeat_by_rounding():
     assert "repeated_rows" not in codes(found)
     noise = 1e-5 * np.repeat(rng.standard_normal((3000, 6)), 2, axis=0)
     held = inspect(ImuRecord(0.01 * np.arange(1, 6001), rate[:1] + noise[:, :3], force[:1] + noise[:, 3:]))
-    assert "repeated_rows" in codes(held, "warning")
+    assert "repeated_rows" in codes(held, "note")
 
 
 def test_repeated_rows():
@@ -28,7 +28,7 @@ def test_repeated_rows():
     rows = np.arange(len(record)) // 2 * 2
     found = inspect(ImuRecord(record.time, record.gyro[rows], record.accel[rows]))
     assert found.sampling.repeated_rows == len(record) // 2
-    assert "repeated_rows" in codes(found, "warning")
+    assert "repeated_rows" in codes(found, "note")
 
 
 def test_rows_that_are_held_are_found_though_their_channels_repeat_by_themselves():

@@ -16,6 +16,7 @@ from truenorth.core.attitude import euler_from_dcm
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.plugins import plugin, plugins
 from truenorth.core.position import Position
+from truenorth.quality.held import as_sampled, epoch_sampled
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specified import epoch_felt
@@ -326,7 +327,7 @@ def align(
         raise UsageError(
             f"aid holds two of one type: {', '.join(type(a).__name__ for a in given)}; expected one of each"
         )
-    log, unsaid = ImuRecord.of(record), tuple[Evidence, ...]()
+    log, unsaid = as_sampled(record), tuple[Evidence, ...]()
     if imu is not None and (said := imu_spec(imu)).unsaid:
         from truenorth.alignment.unsaid import completed
 
@@ -338,7 +339,7 @@ def align(
         imu,
         aids,
         method if isinstance(method, str) else getattr(method, "__name__", "own"),
-        at,
+        epoch_sampled(at, record, log),
         calibration,
         heading_limit,
         progress,

@@ -25,6 +25,7 @@ from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
 from truenorth.navigation.start import moving_start, start_from_alignment
+from truenorth.quality.held import as_sampled
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -191,7 +192,7 @@ def known_start(
     AlignmentError
         The vehicle moves from the first seconds on, and no level is given.
     """
-    log, at = ImuRecord.of(record), Position.of(place)
+    log, at = as_sampled(record), Position.of(place)
     spec = as_usual(imu_spec(imu), log)
     if (pitch is None) != (roll is None):
         raise UsageError("pitch or roll is given alone; expected both, or none: the level then comes from the log")
@@ -247,7 +248,7 @@ def start_from_master(
     DataError
         No row of the master within the record.
     """
-    log = ImuRecord.of(record)
+    log = as_sampled(record)
     if master.C_nb is None:
         raise UsageError(f"{master.source}: no attitude in it; expected heading, pitch and roll")
     inside = np.flatnonzero((master.time >= log.time[0] - log.interval) & (master.time < log.time[-1] - log.interval))

@@ -50,6 +50,7 @@ from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
+from truenorth.quality.held import as_sampled
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
@@ -164,7 +165,7 @@ def navigate(
     answer = by(imu=imu)
     if damping is not None or answer.status != "inconsistent":
         return answer
-    log, spec = ImuRecord.of(record), start_of(start, imu)[1]
+    log, spec = as_sampled(record), start_of(start, imu)[1]
     spec = seen_in(with_rounding(spec, log, aided=bool(by_key(aid))), log)
     return as_noisy_as_its_rows(answer, log, spec, lambda x: by(imu=x))
 
@@ -193,8 +194,7 @@ def _by_specification(
     given = by_key(aid)
     begin, spec, imu_source = start_of(start, imu)
     check_start(begin)
-    log = ImuRecord.of(record)
-    record = _from_start(corrected(log, spec, calibration), begin)
+    record = _from_start(corrected(log := as_sampled(record), spec, calibration), begin)
     check_start_at_rest(begin, record)
     record, gaps, disturbances = bridge_gaps(record)
     noise = seen_in(with_rounding(spec, log, aided=bool(given) and damping is None), record)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from truenorth.core.language import translated as _
 from truenorth.core.shown import Shown
 from truenorth.core.units import parse_unit
+from truenorth.quality.held import at_own_rate, held_findings
 from truenorth.quality.plausibility import Turning, check_plausibility
 from truenorth.quality.regimes import KINDS, Kind, MotionSummary, Regime, motion_summary
 from truenorth.quality.sampling import Finding, Sampling, check_sampling
@@ -217,20 +218,22 @@ def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
     lat : float, rad, optional
         Latitude; lets the earth's rate be checked by its vertical part too.
     """
-    record = ImuRecord.of(record)
+    written = ImuRecord.of(record)
+    record = at_own_rate(written)
     motion = motion_summary(record)
     sampling, findings = check_sampling(record)
     turning, doubts = check_plausibility(record, motion, lat)
-    findings = [*findings, *doubts]
+    findings = [*findings, *doubts, *held_findings(record)]
+    sampling = replace(sampling, repeated_rows=sampling.repeated_rows + len(written) - len(record))
     gyro_noise, accel_noise, rest = _noise_at_rest(record, motion, findings)
     findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
     return Inspection(
         source=record.source,
-        samples=len(record),
-        start=float(record.time[0]),
-        stop=float(record.time[-1]),
-        duration=record.duration,
-        interval=record.interval,
+        samples=len(written),
+        start=float(written.time[0]),
+        stop=float(written.time[-1]),
+        duration=written.duration,
+        interval=written.interval,
         sampling=sampling,
         motion=motion,
         turning=turning,
