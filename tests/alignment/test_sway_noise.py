@@ -39,6 +39,15 @@ def test_noise_of_another_sensor_is_named_on_a_sway(sensor):
     assert f"specification.{sensor}_noise" in _said(answer), answer
 
 
+@pytest.mark.parametrize("sensor", some(["gyro"], ["accel"]))
+def test_a_specification_without_noise_is_no_measure_of_rows(sensor):
+    inputs, truth = BENCHES["swaying"].draw(12, 3)
+    spec = replace(inputs["imu"], **{f"{sensor}_random_walk": 0.0})
+    answer = align(inputs["record"], inputs["place"], spec)
+    assert not any(item.key.endswith("_rows") for item in answer.evidence)
+    assert answer.status != "aligned" or max(float(np.abs(x).max()) for x in misses(answer, truth).values()) < 4.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("run", [12, 18])
 def test_a_ship_that_moves_slowly_in_many_tones_has_the_gyros_that_she_says(run):

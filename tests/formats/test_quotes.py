@@ -170,6 +170,13 @@ def test_a_line_end_inside_a_quoted_cell_is_no_end_of_a_row(read, end, mark):
     assert f"quoted cells that end with the end of a line: {len(ROWS)}" in notes(record)
 
 
+def test_lines_keep_their_numbers_where_quoted_cells_end_with_a_line(read):
+    lines = [said(k, "\n") for k in range(len(ROWS))]
+    lines[9] = lines[9].replace(ROWS[9].split(",")[6], "X9.8", 1)
+    with pytest.raises(DataError, match=f"line {2 + 2 * 9}, column"):
+        read([HEADER + ",raw", *lines])
+
+
 def test_an_open_quote_is_no_cell_that_ends_with_a_line(read):
     """The next line's quote belongs to another cell: nothing is joined, and the row is mended as before."""
     record = read(changed(9, at(ROWS[9], 6, '"{}')))

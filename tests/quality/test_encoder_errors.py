@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 
 from tests.runs import few_and_all
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import EARTH_RATE
 from truenorth.core.indexing import C_bs_from_angles
+from truenorth.quality.encoder import encoder_evidence
 from truenorth.quality.encoder_errors import Turns, error_evidence, errors_of, f_limit
 from truenorth.quality.encoder_slips import slip_of
 from truenorth.quality.prediction import filtered_back, prediction, step_energies
+from truenorth.records import ImuRecord
 
 ARCSEC = np.radians(1.0) / 3600.0
 
@@ -145,3 +149,19 @@ def test_limits_of_a_ratio_of_chi_squares():
     """F(0.99; 1, 8) and F(0.99; 2, 8), by tables."""
     assert f_limit(0.01, 1, 8) == pytest.approx(11.26, abs=0.01)
     assert f_limit(0.01, 2, 8) == pytest.approx(8.65, abs=0.01)
+
+
+def test_a_base_turns_with_the_earth():
+    """Within 48 minutes by more than any sway: sound logs of an hour were refused."""
+    time = np.arange(1.0, 7201.0)
+    rate = np.tile(EARTH_RATE * np.array([0.0, 0.6, 0.8]), (len(time), 1))
+    record = ImuRecord(time, rate, np.tile([0.0, 0.0, 9.8], (len(time), 1)), "rates", "made")
+
+    def still(at):
+        return np.broadcast_to(np.eye(3), (len(at), 3, 3))
+
+    def leaving(at):
+        return dcm_from_rotation_vector(np.outer(at, [0.0, 0.0, 2e-4]))
+
+    assert encoder_evidence(record, still, {"again": still}) == []
+    assert [item.key for item in encoder_evidence(record, leaving, {"again": leaving})] == ["encoder.drifts"]

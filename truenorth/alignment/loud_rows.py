@@ -24,13 +24,15 @@ from truenorth.state.limits import limit
 if TYPE_CHECKING:
     from truenorth.alignment.swaying import SwayAlignment
 
+LOUDEST = 1000.0  # times what was said: sensors of all classes lie as far apart
+
 
 def loud_rows_evidence(fine: SwayAlignment, spec: ImuSpec) -> list[Evidence]:
     """That rows are louder than specified, and what the log lets that do to heading and level."""
     seen = white_above_sway(fine.about)
     if seen is None or fine.noisier:
         return []
-    left = {sensor: seen[sensor] for sensor in SENSORS if seen[sensor] > limit("another sensor")}
+    left = {sensor: min(seen[sensor], LOUDEST) for sensor in SENSORS if seen[sensor] > limit("another sensor")}
     least = 2.0 * float(fine.estimates.log_likelihood) - limit("ruled out")
     while left:
         louder = copy.copy(fine.about)

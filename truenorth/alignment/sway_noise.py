@@ -134,13 +134,10 @@ def white_above_sway(log: StayingLog) -> dict[str, float] | None:
 
 
 def _times_said(log: StayingLog, density: Array) -> dict[str, float]:
-    """Of densities (6,), by the worst axis of each sensor."""
-    said = asdict(log.noise)
-    channels = {"gyro": slice(0, 3), "accel": slice(3, 6)}
-    return {
-        sensor: float(density[channels[sensor]].max()) / max(said[f"{sensor}_random_walk"], 1e-300)
-        for sensor in SENSORS
-    }
+    """Of densities (6,), by the worst axis of each sensor; zero where no noise was said, of which nothing is a multiple."""
+    said = {sensor: getattr(log.noise, f"{sensor}_random_walk") for sensor in SENSORS}
+    loud = {"gyro": float(density[:3].max()), "accel": float(density[3:].max())}
+    return {sensor: loud[sensor] / said[sensor] if said[sensor] > 0.0 else 0.0 for sensor in SENSORS}
 
 
 def sway_noise_evidence(noisier: Mapping[str, float], spec: ImuSpec, lat: float) -> list[Evidence]:

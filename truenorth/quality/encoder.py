@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_quaternion, rotation_vector_from_dcm
+from truenorth.core.earth import EARTH_RATE
 from truenorth.quality.tilt import whole_cells
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence, contradiction
@@ -55,7 +56,8 @@ def encoder_evidence(
     best, name = min((turns(reading)[0], name) for name, reading in others.items())
     if given**2 > limit("clearer encoder") * best**2:
         return [contradiction("encoder.turns", "encoder", given=given, best=best, reading=name)]
-    drifted = BIASED * gyro_bias * record.duration * 2.0 / 3.0
+    # The base turns with the earth, and by what the gyros drift.
+    drifted = (EARTH_RATE + BIASED * gyro_bias) * record.duration * 2.0 / 3.0
     if net > NET_TURN + drifted or given > FASTEST:
         return [contradiction("encoder.drifts", "encoder", net=net, rate=given)]
     return []
