@@ -45,6 +45,7 @@ PRODUCTS = (
     1.0  # times what products of the sway show of an outer axis' pattern, a line as its own is: an error is larger
 )
 UNSURE = 0.99  # of the limit of an error
+IN_THE_SEA = "1.2"  # twice a turn of the outer axis is as fast as waves: one of them may be it (1 of 60 made sways)
 LINE = 0.3  # of an error's size, from which a line of the sway may have made it
 OWN = 0.2  # of the energy of a pattern, which the fit leaves of it, from which it is one of its own
 UNKNOWN = math.radians(10.0)  # rad, one sigma: of what is looked for
@@ -340,8 +341,10 @@ def errors_of(turns: Turns, slip: Callable[[Turns], Array] | None = None) -> dic
             besides = line if more is None else np.concatenate([more, line], axis=2)
             fit, *others = (fitted(turns, order, besides) for order in ORDERS)
             beyond = min(beyond, *(beyond_chance(each, name) for each in (fit, *others)))
-        if beyond > hint:  # below all that the base sways by about as fast it is a hint, however clear
-            found[name] = fit, beyond if size > amplitude else min(beyond, UNSURE)
+        if (
+            beyond > hint
+        ):  # below all that the base sways by about as fast, or in the sea's band, it is a hint, however clear
+            found[name] = fit, beyond if size > amplitude and name != IN_THE_SEA else min(beyond, UNSURE)
     return found
 
 
