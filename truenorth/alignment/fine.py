@@ -8,7 +8,7 @@ it is, is read from the log itself, axis by axis, by making the innovations as l
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -35,6 +35,7 @@ from truenorth.errors.staying import (
 from truenorth.estimate.base_motion import FilteredAsKnown, VelocityNoise, white_variance
 from truenorth.estimate.batch import ROUGHLY, Filtered, Settled, in_sigmas, settle
 from truenorth.estimate.staying import KnownSensors, StayingLog, prior_of
+from truenorth.filters import Estimates, LinearSystem
 from truenorth.filters.gains import Gains, filter_gains, initial_part
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -102,6 +103,10 @@ class FineAlignment(Filtered):
             form=log.form,
             **more,
         )
+
+    def filtered_by(self, system: LinearSystem, estimates: Estimates) -> Self:
+        """The same log by another system, and what a filter made of that."""
+        return replace(self, system=system, estimates=estimates, gains=filter_gains(system, estimates))
 
     @property
     def bias(self) -> Array:
@@ -194,7 +199,7 @@ class CoarseStart(NamedTuple):
     rows_at: Array | None = None  # (M,) int: rows after which the integrated attitude is wanted
     sensors: KnownSensors | None = None  # coarse errors, to take off to begin with
     shares: bool = (
-        False  # whether biases act by the attitude of a cell, and `P_bias` is of it (:mod:`truenorth.estimate.cells`)
+        False  # whether biases act by the attitude of a cell (:mod:`truenorth.estimate.cells`), of which `P_bias` is
     )
 
     def right_record(self) -> ImuRecord:

@@ -28,7 +28,7 @@ from truenorth.core.compiled import compiled
 from truenorth.errors.staying import PHI
 from truenorth.errors.sway import AxisMotion, Oscillator, motion_first
 from truenorth.filters import Estimates, LinearSystem, kalman
-from truenorth.filters.gains import filter_gains, through
+from truenorth.filters.gains import through
 from truenorth.quality.colour import colour_of
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit, may_be_chance
@@ -148,7 +148,7 @@ def _weighed(fine: FineAlignment, seen: Innovations, cause: Cause, ratio: float)
 def _with(fine: FineAlignment, system: LinearSystem, filtered: bool) -> FineAlignment:
     """The log by a system with less of a motion, or as it was filtered; without states that nothing moves."""
     system, estimates = _of_moved_states(system, fine.estimates if filtered else kalman(system, history="full"))
-    return replace(fine, system=system, estimates=estimates, gains=filter_gains(system, estimates))
+    return fine.filtered_by(system, estimates)
 
 
 def _of_moved_states(system: LinearSystem, estimates: Estimates) -> tuple[LinearSystem, Estimates]:

@@ -37,7 +37,6 @@ from truenorth.errors.sway import AxisMotion
 from truenorth.estimate.batch import settle
 from truenorth.estimate.staying import Prior, StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
-from truenorth.filters.gains import filter_gains
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, integrate
@@ -108,8 +107,7 @@ class SwayAlignment(FineAlignment):
 
     def _bias_of(self, system: LinearSystem) -> float:
         """:func:`best_bias` of the log by another system."""
-        estimates = kalman(system, history="full")
-        return best_bias(replace(self, system=system, estimates=estimates, gains=filter_gains(system, estimates)))
+        return best_bias(self.filtered_by(system, kalman(system, history="full")))
 
     def suspect(self) -> bool:
         """Whether something seems to have begun within the log, or a sensor to be noisier than specified."""
