@@ -60,8 +60,14 @@ def test_a_turn_of_which_a_fitted_motion_takes_up_a_part_is_refused():
 @pytest.mark.parametrize(
     ("seed", "run", "row", "column", "size"),
     some(
-        [(60, 7, 0, 0, 0.0273), (52, 1, 2, 1, -0.05)],
-        [(60, 1, 0, 0, -0.015), (60, 4, 0, 1, -0.0078), (60, 6, 1, 1, -0.0071), (52, 5, 2, 1, 0.03)],
+        [(60, 7, 0, 0, 0.0273)],
+        [
+            (52, 1, 2, 1, -0.05),
+            (60, 1, 0, 0, -0.015),
+            (60, 4, 0, 1, -0.0078),
+            (60, 6, 1, 1, -0.0071),
+            (52, 5, 2, 1, 0.03),
+        ],
     ),
 )
 def test_one_gyro_that_is_askew_or_scaled_is_found_and_refused(seed, run, row, column, size):
@@ -79,6 +85,7 @@ def test_one_gyro_that_is_askew_or_scaled_is_found_and_refused(seed, run, row, c
     assert answer.status == "inconsistent"
 
 
+@pytest.mark.slow
 def test_a_scale_that_the_whole_log_shows_outweighs_the_vertical():
     """The log is likelier by 4300 with it, the slow vertical velocity, by an attitude not fitted anew, less so by 24: 39 sigmas."""
     inputs, _ = BENCHES["swaying"].draw(97712, 6)

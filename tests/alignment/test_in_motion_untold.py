@@ -41,7 +41,7 @@ def task_of(record, odometer, imu="consumer"):
     return moving_task(record, imu, odometer, None, PLACE, None, None, (), True, None, 0.0)
 
 
-@few_and_all(30, few=2)
+@few_and_all(30, few=1)
 def test_level_is_what_turns_tell(runs):
     """Before: level 3.9 of its sigma, up to 10.5. Two numbers a run; false alarms 1 in 1000."""
     total = 0.0

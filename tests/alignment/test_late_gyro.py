@@ -51,6 +51,7 @@ def test_sound_gyros_are_of_one_moment(bench, runs):
         assert late_gyro(BENCHES[bench].align(inputs)) == []
 
 
+@pytest.mark.slow
 def test_waves_that_push_a_buoy_delay_no_gyro():
     """Its x gyro late by .07 s is likelier by 43 than a delay of all; put right, a push in step explains hundreds."""
     rng = np.random.default_rng([4200, 2, 9])

@@ -59,6 +59,7 @@ def shaken_and_lost(record):
     return replace(record, time=record.time[keep], gyro=gyro[keep], accel=accel[keep])
 
 
+@pytest.mark.slow
 def test_a_slave_whose_rows_are_lost_is_no_poorer_one(monkeypatch):
     """What bridges miss is noise of the filter: it was taken for a bending body, and all such logs were refused."""
     whole = transfer.align_transfer

@@ -11,7 +11,6 @@ from benchmarks.honesty import foreign, vehicles
 from benchmarks.honesty.foreign import log, sensed
 from benchmarks.honesty.foreign_rows import CASES
 from tests.alignment.test_motion_fit import MOTIONS, WALKS, drawn
-from tests.runs import some
 from truenorth.alignment import align, swing
 from truenorth.alignment.motion_fit import _score
 from truenorth.alignment.motion_likelihood import Series
@@ -164,7 +163,8 @@ def test_a_ship_on_her_lines_is_aligned(seed, run):
     assert answer.ongoing.P.shape == (39, 39)
 
 
-@pytest.mark.parametrize(("leaves", "refused"), some([(0.0, False)], [(3.0, True)]))
+@pytest.mark.slow
+@pytest.mark.parametrize(("leaves", "refused"), [(0.0, False), (3.0, True)])
 def test_a_drift_that_is_small_against_sigma_refuses_no_ship(leaves, refused, monkeypatch):
     """A slow heel looked like a drift by a ratio of 27, small against the sigma of a tactical IMU; one to 3 m/s is one."""
 

@@ -125,9 +125,10 @@ def test_a_slip_in_a_gap(runs):
         assert slip_of(Turns(**{**vars(sound), "there": turns.there})) is None
 
 
-def test_a_base_that_is_knocked_does_not_slip():
+@few_and_all(4, few=1)
+def test_a_base_that_is_knocked_does_not_slip(runs):
     """Turned for good by 0.1 deg about all axes, or about one, and back within seconds."""
-    for run in range(4):
+    for run in range(runs):
         rng = np.random.default_rng([run, 6])
         turns = made(rng)
         since = turns.time - 140.0
