@@ -58,6 +58,16 @@ align_runs(plan, plan.cases[0], range(2, 22))
 print(json.dumps((time.process_time() - begun) / 20 * 1000))
 """
 
+WORKERS = """
+import json, tempfile, time
+from benchmarks.bench_campaign import PLAN
+from truenorth.campaign import run_campaign
+begun = time.perf_counter()
+with tempfile.TemporaryDirectory() as folder:
+    run_campaign({**PLAN, "runs": 1000}, folder, workers=2)
+print(json.dumps(time.perf_counter() - begun))
+"""
+
 
 def interpreter(checkout: Path) -> str:
     """That of a checkout's own environment, or this one."""
@@ -163,6 +173,10 @@ def main() -> None:
             ("the demo, nothing compiled, s", lambda: both(first_demo, 1)),
             ("first `align`, nothing compiled, s", lambda: both(first, 1)),
             (f"`align` after a comment was added to {EDITED[0]}, s", lambda: both(after_an_edit, 1)),
+            (
+                "1000 static alignments of 600 s at 100 Hz, two workers, s on the clock",
+                lambda: both(lambda c: said(c, WORKERS), repeats),
+            ),
         ]
         asked = [int(number) for number in sys.argv[3].split(",")] if len(sys.argv) > 3 else range(1, len(rows) + 1)
         for number, once in ((1, align), (2, with_report), (3, with_report), (6, demo)):

@@ -42,6 +42,7 @@ LARGEST_RATE = 2000.0 * DEG  # rad/s
 BIAS_RATIOS = np.logspace(0.0, 4.0, 17)  # bias, deg/h, over random walk, deg/sqrt(h), of gyros of all classes
 TYPICAL, TYPICAL_FORCE, WORST_FORCE_WALK = DEG / 60.0 * 0.2, 80e-6 * G, 400e-6 * G  # rad/sqrt(s), m/s/sqrt(s)
 CLASS_DECADES = 0.6
+ROUGH = 2.3  # variance of second differences over that of first ones: 3 for white noise, 2.3 where neighbours correlate by .7
 NO_UNIT = 1.1  # of the logarithm, by which the unit that fits best turns gravity too far or not enough: counts, for one
 LARGE_TURN = 3.0 * DEG  # of two axes: what angles must turn by to be known from rates
 FAR_BETTER = 0.5  # of the agreement of angles: what that of rates must stay below
@@ -210,15 +211,24 @@ def _at_rest_part(data: Array, interval: float) -> Array:
 
 
 def _random_walk(data: Array, interval: float) -> float:
-    """Of the three columns the middle one's: the least of the Allan deviation times the root of its time."""
-    walks = []
+    """Of the three columns the middle one's: the least of the Allan deviation times the root of its time.
+
+    Rows that a low-pass filter or an interpolation has smoothed differ less from their neighbours than the noise: they do not
+    count where tenths of a second differ as white noise does. (Of a sway these are smooth, too, and rows count.) Second
+    differences have three times the variance of first ones where noise is white, ``3 - rho`` times where neighbours correlate
+    by rho.
+    """
+    walks, rough = [], []
     for tau in (interval, 0.1, 0.5, 1.0, 2.0):
         m = max(1, round(tau / interval))
         count = len(data) // m
         if count >= 8:
-            means = data[: count * m].reshape(count, m, 3).mean(axis=1)
-            walks.append(np.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2, axis=0) * m * interval))
-    return float(np.median(np.min(walks, axis=0))) if walks else 0.0
+            change = np.diff(data[: count * m].reshape(count, m, 3).mean(axis=1), axis=0)
+            power, second = np.mean(change**2, axis=0), np.mean(np.diff(change, axis=0) ** 2, axis=0)
+            walks.append(np.sqrt(0.5 * power * m * interval))
+            rough.append(bool(np.median(second - ROUGH * power) > 0.0))
+    smoothed = rough[:2] == [False, True]
+    return float(np.median(np.min(walks[smoothed:], axis=0))) if walks else 0.0
 
 
 def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence[str] | None = None) -> list[Reading]:
