@@ -19,8 +19,19 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.content import REMARKS_BYTES, text_of
-from truenorth.formats.dialect import DELIMITERS, EITHER, SAMPLE, Dialect, dialect_of, is_remark, with_points
-from truenorth.formats.quotes import without_ends_in_quotes, without_outer_quotes, without_stray_quotes
+from truenorth.formats.dialect import (
+    DELIMITERS,
+    EITHER,
+    SAMPLE,
+    Dialect,
+    dialect_of,
+    is_remark,
+    notes_on_other_rows,
+    with_points,
+)
+from truenorth.formats.labelled import table_of_labels
+from truenorth.formats.line_ends import without_ends_in_quotes
+from truenorth.formats.quotes import without_outer_quotes, without_stray_quotes
 from truenorth.records import Record
 
 if TYPE_CHECKING:
@@ -198,6 +209,13 @@ def open_table(path: Path) -> TextTable:
     head = _head(path, text)
     if not head:
         raise DataError(f"{path.name}: no header and no numbers; the file holds empty lines only")
+    if (labelled := table_of_labels(path.name, text, [line for _, line in head])) is not None:
+        said = tuple(one for one in (note, joined, *labelled.notes) if one is not None)
+        return without_a_cut_end(
+            TextTable(
+                path, labelled.text, labelled.names, True, Dialect(",", "."), labelled.skip, "", labelled.above, said
+            )
+        )
     dialect, count = dialect_of(head)
     text, mended = without_stray_quotes(
         path.name, text, dialect.delimiter, count, lambda cells: _are_row(dialect, cells, count)
@@ -211,20 +229,14 @@ def open_table(path: Path) -> TextTable:
     names, used = _header(path, dialect, head[:first], count, first_cells=dialect.cells(head[first][1]))
     above = tuple(line for k, (_, line) in enumerate(head[:first]) if k not in used)
     named = bool(used)
-    lost = [
-        head[k][0]
-        for k in range(max(used, default=-1) + 1, first)
-        if not is_remark(head[k][1]) and all(map(dialect.is_number, dialect.cells(head[k][1])))
-    ]
-    if lost:
-        notes += (f"lines of numbers that are no whole row left out: {len(lost)}, the first is line {lost[0]}",)
+    notes += notes_on_other_rows(path.name, dialect, head[:first], used, count)
     header = head[min(k for k in used if k >= 0)][1] if named else ""
     names = names if named else [str(i + 1) for i in range(count)]
     if dialect.decimal == EITHER:
         text = with_points(path.name, text, head[first][0] - 1, names, dialect)
         dialect = replace(dialect, decimal=".")
         notes += ("decimal points in some columns, commas in others",)
-    return _without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
+    return without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
 
 
 def _with_stamps_apart(text: bytes) -> bytes:
@@ -355,7 +367,7 @@ def _without_rows(path: Path, text: bytes, head: list[tuple[int, str]], notes: t
     return TextTable(path, text, names, True, Dialect(DELIMITERS[cells.index(names)], "."), number, line, (), notes)
 
 
-def _without_a_cut_end(table: TextTable) -> TextTable:
+def without_a_cut_end(table: TextTable) -> TextTable:
     """Leave out a last line that a logger did not finish: too few cells, or no line end and a cell shorter than above."""
     blanks = b" \t" if table.dialect.delimiter != "\t" else b" "
     text = table.text.rstrip(b"\r\n" + blanks)
