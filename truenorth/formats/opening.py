@@ -23,8 +23,11 @@ def columns_of(path: Path, format: str, named: bool = True) -> Columns:
         A damaged file, or one without a table.
     """
     if format in ("csv", "kf-gins", "psins"):
+        from truenorth.formats import vbo
         from truenorth.formats.text import open_table
 
+        if vbo.is_one(path):
+            return vbo.columns(path)
         table = open_table(path)
         notes = (*table.notes, table.dialect.words())
         why = "the dialect in which most lines are rows of numbers"
