@@ -249,3 +249,37 @@ def test_labelled_lines_that_are_cut_at_the_ends(tmp_path):
     record = read_imu(tmp_path / "log.txt")
     assert len(record) == len(lines) - 2
     assert "the last line is cut: left out" in notes(record)
+
+
+# ------------------------------------------------------------------------------------------- more of the same logs' sort
+
+
+def test_a_row_with_text_that_lacks_its_beginning_is_noted(tmp_path):
+    lines = [f"{line},ok" for line in LINES]
+    record = read_imu(write(tmp_path / "log.csv", [f"{HEADER},note", lines[0][24:], *lines[1:]]))
+    assert "lines of numbers that are no whole row left out: 1, the first is line 2" in notes(record)
+
+
+def test_sentences_of_a_receiver_above_a_table_are_no_header(tmp_path):
+    """As the multi-sensor logger of a university writes them: the date, then the rows."""
+    lines = ["logger.ino", "GPZDA,130427.00,15,08,2023,00,00*6A", *LINES]
+    is_read(write(tmp_path / "log.txt", lines))
+
+
+def test_a_clock_that_an_export_lists_and_the_device_does_not_send(tmp_path):
+    """As Xsens's program writes it: the rate stands above, the column of the fine time is empty."""
+    above = "// Start Time: Unknown\n// Update Rate: 100.0Hz\n// Firmware Version: 4.0.2\n"
+    names = ["PacketCounter", "SampleTimeFine", "UTC_Nano", *(f"Acc_{x}" for x in "XYZ"), *(f"Gyr_{x}" for x in "XYZ")]
+    count = [f"{k:05d}" for k in range(len(LINES))]
+    table = rows(count, [""] * len(count), [""] * len(count), MOVED.accel, MOVED.gyro, sep="\t")
+    (tmp_path / "log.txt").write_text(above + "\t".join(names) + "\n" + table)
+    assert "rate: 100 Hz" in notes(is_read(tmp_path / "log.txt"))
+
+
+def test_whole_seconds_and_the_milliseconds_that_elapsed(tmp_path):
+    """As scripts for a microcontroller write them."""
+    seconds = [f"{700000000 + int(t + 1e-6)}" for t in MOVED.time]
+    parts = [f"{round(1e3 * t) % 1000}" for t in MOVED.time]
+    header = "Epoch_time_s,milliseconds_elapsed,Ax,Ay,Az,Gx,Gy,Gz\n"
+    (tmp_path / "log.csv").write_text(header + rows(seconds, parts, MOVED.accel / G, MOVED.gyro / DEG))
+    is_read(tmp_path / "log.csv")

@@ -25,10 +25,10 @@ OF_OTHERS = re.compile(
 )
 OF_IMU = re.compile(r"(?:^|_)(?:imu|acc\w*|gyr\w*|inertial|sensors?)(?=_|\d|$)")
 STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
-SECONDS = re.compile(r"(?i)(?:^|[^a-z])(?:secs?|seconds|unix[ _]?time(?:stamp)?)$")
+SECONDS = re.compile(r"(?i)(?:^|[^a-z])(?:secs?|seconds|(?:unix|epoch)[ _]?time(?:stamp)?(?:[ _]s)?)$")
 FRACTIONS = {
-    1e-3: re.compile(r"(?i)(?:^|[^a-z])(?:milli_?seconds?|millis|msecs?)$"),
-    1e-6: re.compile(r"(?i)(?:^|[^a-z])(?:micro_?seconds?|micros|usecs?)$"),
+    1e-3: re.compile(r"(?i)(?:^|[^a-z])(?:milli_?seconds?|millis|msecs?)(?:_elapsed)?$"),
+    1e-6: re.compile(r"(?i)(?:^|[^a-z])(?:micro_?seconds?|micros|usecs?)(?:_elapsed)?$"),
 }
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
@@ -68,6 +68,7 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
         return choice
     taken = {name for name, _ in choice.sensors}
     names = [name for name in columns.names if name not in taken]
+    names = [name for name in names if not (columns.named and clock_of(name)[0] and _is_empty(columns, name))]
     if "time" in names:
         choice.time = ("time",)
         return choice
@@ -109,6 +110,15 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     if layout.rate is None:
         _clock_by_behaviour(columns, layout, choice, names)
     return choice
+
+
+def _is_empty(columns: Columns, name: str) -> bool:
+    """Whether a clock has no value in any row, as those that a program's export lists and a device does not send."""
+    column = columns.column(name)
+    text = not column.null_count and column.type in ("string", "large_string")
+    return len(column) > 0 and (
+        column.null_count == len(column) or (text and not any(map(str.strip, column.to_pylist())))
+    )
 
 
 def _of_two_columns(columns: Columns, names: Sequence[str], choice: Choice) -> bool:

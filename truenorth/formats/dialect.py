@@ -138,7 +138,7 @@ def notes_on_other_rows(
                 f"{source}: line {number}: {len(cells)} columns, as in {len(rows)} lines above the rows of {count} columns; "
                 "expected one table: save each part as a log of its own, or remove the lines that are cut"
             )
-        said = [n for n, _ in (plain if below else rows)]
+        said = sorted({n for n, _ in [*(plain if below else []), *rows]})
         if said:
             where = "lines of numbers that are no whole row" if below else "lines of numbers above the header"
             notes.append(f"{where} left out: {len(said)}, the first is line {said[0]}")

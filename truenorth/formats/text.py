@@ -308,7 +308,8 @@ def _header(
             cells = dialect.cells(line)
             listed = dialect.delimiter is not None and not is_remark(line) and k == len(above) - 1
             # Numbers alone are no header but a row that lacks its beginning: a logger that was switched on in its midst.
-            if listed and len(cells) >= max(3, count // 2) and not all(map(dialect.is_number, cells)):
+            # Neither is one of which most are numbers, as a sentence of a receiver.
+            if listed and len(cells) >= max(3, count // 2) and dialect.share(cells) < 0.5:
                 raise DataError(
                     f"{path.name}: line {above[k][0]}: a header of {len(cells)} columns above rows of {count}; "
                     "expected as many of each: if commas stand both between columns and in decimals, write the log with "
