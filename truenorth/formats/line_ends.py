@@ -28,7 +28,7 @@ def without_ends_in_quotes(text: bytes) -> tuple[bytes, str | None]:
 
     Behind a row an empty line is left for each of them, so that lines keep their numbers.
     """
-    if b'"' not in text or REMOVED in text:
+    if b'"' not in text or REMOVED in text or not any(line.count(b'"') % 2 for line in text.splitlines()):
         return text, None
     folded, count = text, 0
     for cell in (CELL_FIRST, CELL):

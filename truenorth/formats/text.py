@@ -44,6 +44,7 @@ MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
 MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
+SENTENCE = re.compile(r"\$?[A-Z]{5},.*\*[0-9A-F]{2}")
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
 
@@ -221,7 +222,8 @@ def open_table(path: Path) -> TextTable:
         path.name, text, dialect.delimiter, count, lambda cells: _are_row(dialect, cells, count)
     )
     head = _head(path, text) if mended else head
-    rows = [not is_remark(line) and _are_row(dialect, dialect.cells(line), count) for _, line in head]
+    said = [is_remark(line) or SENTENCE.fullmatch(line.strip()) is not None for _, line in head]
+    rows = [not no and _are_row(dialect, dialect.cells(line), count) for no, (_, line) in zip(said, head)]
     first = rows.index(True) if any(rows) else None
     notes = tuple(said for said in (note, joined, mended) if said is not None)
     if first is None:
@@ -293,8 +295,8 @@ def _header(
     unit_line = -1
     for k in range(len(above) - 1, -1, -1):
         line = above[k][1]
-        if not line.strip(",;|\t "):
-            continue  # separators and nothing between them
+        if not line.strip(",;|\t ") or SENTENCE.fullmatch(line.strip()):
+            continue  # separators and nothing between them, or what a receiver says
         plain = line.lstrip("#%/ \t") if is_remark(line) else line
         for delimiter in (dialect.delimiter, *DELIMITERS):
             names = Dialect(delimiter, ".").cells(plain)
@@ -308,7 +310,6 @@ def _header(
             cells = dialect.cells(line)
             listed = dialect.delimiter is not None and not is_remark(line) and k == len(above) - 1
             # Numbers alone are no header but a row that lacks its beginning: a logger that was switched on in its midst.
-            # Neither is one of which most are numbers, as a sentence of a receiver.
             if listed and len(cells) >= max(3, count // 2) and dialect.share(cells) < 0.5:
                 raise DataError(
                     f"{path.name}: line {above[k][0]}: a header of {len(cells)} columns above rows of {count}; "
