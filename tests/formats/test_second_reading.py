@@ -214,6 +214,11 @@ def test_a_sample_of_several_lines(tmp_path):
     assert "unit of the gyros: rad/s" in notes(record)
     path.write_text("\n".join(lines[:-3]) + "\n")
     assert len(read_imu(path, rate=100.0)) == len(MOVED.time) - 1
+    begun = read_imu(
+        write(path, lines[4:]), rate=100.0
+    )  # inside a sample, whose forces are not paired with the next one's rates
+    np.testing.assert_allclose(begun.accel, MOVED.accel[1:], atol=1e-6)
+    np.testing.assert_allclose(begun.gyro, MOVED.gyro[1:], atol=1e-7)
     lines[101] = "reset"
     with pytest.raises(DataError, match=r"line 102: 'reset'; expected values of "):
         read_imu(write(path, lines), rate=100.0)

@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from truenorth.core.errors import DataError
 from truenorth.formats.units import split, unit_in
@@ -26,6 +27,7 @@ OF_ESP = re.compile(r"(?:\x1b\[[\d;]*m)?[EWIDV] \((\d+)\) [^:\s]+: ")  # the log
 FEWEST, MOST_LINES = 3, 6  # values of a sample, and its lines
 MOSTLY = 0.9  # of the lines that are alike
 SAMPLE = 40  # lines that are looked at
+HEAD = 1 << 14  # bytes in which empty lines are looked for
 AXIS = re.compile(r"[XYZxyz]")
 VALUE = r"([^\s,;|]*?)"
 
@@ -70,9 +72,8 @@ def table_of_labels(name: str, text: bytes, head: Sequence[str]) -> Labelled | N
     found = sum(line is not None for line in lines)
     if found < MOSTLY * len(lines) or not found:
         return None
-    group = _group(
-        [line for line in lines if line is not None], [line for line in map(_line, head) if line is not None]
-    )
+    of_head = [line for line in map(_line, head) if line is not None]
+    group = _group([line for line in lines if line is not None], of_head, _after_empty_lines(text))
     if group is None or sum(len(line.labels) for line in group) < FEWEST:
         return None
     patterns = [re.compile(line.pattern) for line in group]
@@ -180,8 +181,11 @@ def _flexible(literal: str) -> str:
     return r"\s*".join(parts)
 
 
-def _group(sample: Sequence[Line], lines: Sequence[Line]) -> list[Line] | None:
-    """The lines that a sample takes, by what repeats in the last lines of the head, from where it first stands whole."""
+def _group(sample: Sequence[Line], lines: Sequence[Line], begin: set[tuple[str, ...]]) -> list[Line] | None:
+    """The lines that a sample takes, by what repeats in the last lines of the head, from where it first stands whole.
+
+    Where empty lines stand between samples, one of those that `begin` after them is the first: a log may begin inside a sample.
+    """
     for count in range(1, MOST_LINES + 1):
         same = [a.labels == b.labels for a, b in zip(sample, sample[count:])]
         if not same or sum(same) < MOSTLY * len(same):
@@ -190,10 +194,19 @@ def _group(sample: Sequence[Line], lines: Sequence[Line]) -> list[Line] | None:
         if len(common) < count:
             continue
         wanted = {labels for labels, _ in common}
+        first = wanted & begin if len(wanted & begin) == 1 else wanted
         for k in range(len(lines) - count + 1):
-            if {line.labels for line in lines[k : k + count]} == wanted:
+            if {line.labels for line in lines[k : k + count]} == wanted and lines[k].labels in first:
                 return list(lines[k : k + count])
     return None
+
+
+def _after_empty_lines(text: bytes) -> set[tuple[str, ...]]:
+    """The labels of lines that stand behind an empty one, more than once."""
+    raw = [line.decode("utf-8", "replace") for line in text[:HEAD].splitlines()]
+    behind = [_line(line) for before, line in pairwise(raw) if line.strip() and not before.strip()]
+    found = Counter(line.labels for line in behind if line is not None)
+    return {labels for labels, count in found.items() if count > 1}
 
 
 def _with_stems(group: Sequence[Line]) -> list[list[str]]:
