@@ -222,8 +222,8 @@ def open_table(path: Path) -> TextTable:
         path.name, text, dialect.delimiter, count, lambda cells: _are_row(dialect, cells, count)
     )
     head = _head(path, text) if mended else head
-    said = [is_remark(line) or SENTENCE.fullmatch(line.strip()) is not None for _, line in head]
-    rows = [not no and _are_row(dialect, dialect.cells(line), count) for no, (_, line) in zip(said, head)]
+    no_row = [is_remark(line) or SENTENCE.fullmatch(line.strip()) is not None for _, line in head]
+    rows = [not no and _are_row(dialect, dialect.cells(line), count) for no, (_, line) in zip(no_row, head)]
     first = rows.index(True) if any(rows) else None
     notes = tuple(said for said in (note, joined, mended) if said is not None)
     if first is None:
