@@ -24,6 +24,7 @@ PAIR = re.compile(
 )
 STAMP = re.compile(rf"({TIME}|{NUMBER})\s*(?:->|:|,|;|\t|\s|$)\s*")
 OF_ESP = re.compile(r"(?:\x1b\[[\d;]*m)?[EWIDV] \((\d+)\) [^:\s]+: ")  # the log of ESP-IDF: ms since the start
+NOTE = "labelled values"
 FEWEST, MOST_LINES = 3, 6  # values of a sample, and its lines
 MOSTLY = 0.9  # of the lines that are alike
 SAMPLE = 40  # lines that are looked at
@@ -119,7 +120,7 @@ def table_of_labels(name: str, text: bytes, head: Sequence[str]) -> Labelled | N
         names,
         skip - 1,
         tuple(above),
-        tuple(filter(None, ("labelled values", boot, cut))),
+        tuple(filter(None, (NOTE, boot, cut))),
     )
 
 
