@@ -167,7 +167,7 @@ def test_a_line_end_inside_a_quoted_cell_is_no_end_of_a_row(read, end, mark):
     """A script writes the line that a VectorNav sent next to its numbers, with the line end that the device sends."""
     record = read([HEADER.replace(",", mark) + f"{mark}raw", *(said(k, end, mark) for k in range(len(ROWS)))])
     assert same(record, read([HEADER, *ROWS]))
-    assert f"quoted cells that end with the end of a line: {len(ROWS)}" in notes(record)
+    assert f"rows with line ends in quoted cells: {len(ROWS)}" in notes(record)
 
 
 def test_lines_keep_their_numbers_where_quoted_cells_end_with_a_line(read):

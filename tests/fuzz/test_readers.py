@@ -70,7 +70,19 @@ def logs(folder) -> dict[str, bytes]:
     savemat(folder / "whole.mat", {"time": short.time, "gyro": short.gyro, "accel": short.accel})
     rows = [f"$GPGGA,{100000 + k:06d}.00,4806.0,N,01130.0,E,1,08,1.0,500.0,M,45.0,M,," for k in range(20)]
     steps = list(zip(short.increments.gyro, short.increments.accel))
+    values = np.column_stack([short.time, short.gyro, short.accel])
+    labels = [" ".join(f"{name}:{value:.6g}" for name, value in zip(SI.split(","), row)) for row in values]
+    noted = [f'{line},"at {k}\nso"' for k, line in enumerate(table(short, SI).splitlines())]
+    fixes = [f"009 1000{k:02d}.00 +03119.09973 +00058.49277 036.00 090.00 +152.5 +0.3" for k in range(20)]
+    dated = [
+        f"11/03/2021 23:59:{k // 10:02d}.{k % 10}," + ",".join(f"{v:.6g}" for v in row[1:])
+        for k, row in enumerate(values)
+    ]
     return {
+        "labels.txt": ("boot\n" + "\n".join(labels) + "\n").encode(),
+        "noted.csv": ("\n".join(noted) + "\n").encode(),
+        "drive.vbo": (VBO + "\n".join(fixes) + "\n").encode(),
+        "dated.csv": (f"{SI}\n" + "\n".join(dated) + "\n").encode(),
         "log.csv": table(short, SI).encode(),
         "odd.csv": table(short, "t;wx;wy;wz;ax;ay;az", sep=";", decimal=",", gyro=DEG, accel=G).encode(),
         "bare.txt": table(short, "", sep=" ").encode(),
@@ -90,9 +102,17 @@ def logs(folder) -> dict[str, bytes]:
     }
 
 
-READ = {"log.nmea": read_gnss, "fixes.txt": read_gnss, "odo.csv": read_odometer, "spec.yaml": read_mapping}
+VBO = "File created\n\n[header]\nvelocity kmh\n\n[column names]\nsats time lat long velocity heading height vertvel\n\n[data]\n"
+READ = {
+    "log.nmea": read_gnss,
+    "drive.vbo": read_gnss,
+    "fixes.txt": read_gnss,
+    "odo.csv": read_odometer,
+    "spec.yaml": read_mapping,
+}
 NAMES = ["log.csv", "odd.csv", "bare.txt", "log.imu", "log.bin", "log.npz", "log.parquet", "log.mat", "log.ulg",
-         "dataflash.bin", "phone.txt", "fixes.txt", "vn.txt", "log.nmea", "odo.csv", "spec.yaml"]  # fmt: skip
+         "dataflash.bin", "phone.txt", "fixes.txt", "vn.txt", "log.nmea", "odo.csv", "spec.yaml",
+         "labels.txt", "noted.csv", "drive.vbo", "dated.csv"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -8,20 +8,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
-from truenorth.formats.names import clock_of, is_plain_clock
+from truenorth.formats.names import clock_of, is_plain_clock, plain
 from truenorth.records import Guess
 from truenorth.records.imu import Kind
 
+Array = NDArray[np.float64]
+
+OF_OTHERS = re.compile(
+    r"(?:^|_)(?:gps|gnss|rtk|ref|reference|truth|gt|ground|odo\w*|wheel|encoder|baro\w*|mag\w*|cam\w*|image|lidar|dvl|vel|pos|pva|vicon)(?=_|\d|$)"
+)
+OF_IMU = re.compile(r"(?:^|_)(?:imu|acc\w*|gyr\w*|inertial|sensors?)(?=_|\d|$)")
 STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
-SECONDS = re.compile(r"(?i)(?:^|[^a-z])(?:secs?|seconds|unix[ _]?time(?:stamp)?)$")
+SECONDS = re.compile(r"(?i)(?:^|[^a-z])(?:secs?|seconds|(?:unix|epoch)[ _]?time(?:stamp)?(?:[ _]s)?)$")
 FRACTIONS = {
-    1e-3: re.compile(r"(?i)(?:^|[^a-z])(?:milli_?seconds?|millis|msecs?)$"),
-    1e-6: re.compile(r"(?i)(?:^|[^a-z])(?:micro_?seconds?|micros|usecs?)$"),
+    1e-3: re.compile(r"(?i)(?:^|[^a-z])(?:milli_?seconds?|millis|msecs?)(?:_elapsed)?$"),
+    1e-6: re.compile(r"(?i)(?:^|[^a-z])(?:micro_?seconds?|micros|usecs?)(?:_elapsed)?$"),
 }
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
@@ -38,6 +45,8 @@ class Choice:
     named: bool = True  # names say what the columns are; else their numbers do, which fit a rare unit by chance
     guesses: list[Guess] = field(default_factory=list)
     fraction: float = 1e-9  # s, that the second column of the time counts
+    # units, and why, that the device which wrote the log always has: what the headings name wins
+    device: dict[str, tuple[str, str]] = field(default_factory=dict)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -59,6 +68,7 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
         return choice
     taken = {name for name, _ in choice.sensors}
     names = [name for name in columns.names if name not in taken]
+    names = [name for name in names if not (columns.named and clock_of(name)[0] and _is_empty(columns, name))]
     if "time" in names:
         choice.time = ("time",)
         return choice
@@ -75,7 +85,7 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     if columns.named and _of_two_columns(columns, names, choice):
         return choice
     steady = {name: scatter for name in clocks if (scatter := _scatter(columns, name)) is not None}
-    steady = {name: steady[name] for name in _as_long(columns, choice, list(steady))}
+    steady = {name: steady[name] for name in _own(columns, choice, _as_long(columns, choice, list(steady)))}
     plainly = {name: scatter for name, scatter in steady.items() if is_plain_clock(name)}
     steady = plainly or steady
     if steady:
@@ -100,6 +110,15 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     if layout.rate is None:
         _clock_by_behaviour(columns, layout, choice, names)
     return choice
+
+
+def _is_empty(columns: Columns, name: str) -> bool:
+    """Whether a clock has no value in any row, as those that a program's export lists and a device does not send."""
+    column = columns.column(name)
+    text = not column.null_count and column.type in ("string", "large_string")
+    return len(column) > 0 and (
+        column.null_count == len(column) or (text and not any(map(str.strip, column.to_pylist())))
+    )
 
 
 def _of_two_columns(columns: Columns, names: Sequence[str], choice: Choice) -> bool:
@@ -155,6 +174,41 @@ def _as_long(columns: Columns, choice: Choice, clocks: list[str]) -> list[str]:
     return [name for name in clocks if lengths[name] == rows] or clocks
 
 
+def _own(columns: Columns, choice: Choice, clocks: list[str]) -> list[str]:
+    """Those clocks of a file of arrays that are the sensors' own: of their struct, or not of another device by their names.
+
+    Raises
+    ------
+    UnsureError
+        Several are left, and their steps differ: a log is never timed by another device's clock in silence.
+    """
+    if not columns.rows or len(clocks) < 2:
+        return clocks
+    structs = {name.rpartition(".")[0] for name, _ in choice.sensors}
+    own = [name for name in clocks if name.rpartition(".")[0] in structs] or clocks
+    own = [name for name in own if OF_OTHERS.search(plain(name)) is None] or own
+    own = [name for name in own if OF_IMU.search(plain(name)) is not None] or own
+    times = {name: columns.clock(name)[0] for name in own}
+    if all(np.array_equal(time, times[own[0]]) for time in times.values()):
+        return own[:1]
+    steps = {name: np.diff(time) for name, time in times.items()}
+    first = steps[own[0]]
+    if any(not _same_pace(first, other) for other in steps.values()):
+        options = [{"columns": {"time": name}} for name in own]
+        raise UnsureError(
+            f"{columns.path.name}: columns {', '.join(own)} are clocks of different steps", options, choice.guesses
+        )
+    return own
+
+
+def _same_pace(one: Array, other: Array) -> bool:
+    """Whether the steps of two clocks are the same, in units of ten, a thousand and so on."""
+    if len(one) != len(other) or not one.size or not np.median(one) > 0.0 or not np.median(other) > 0.0:
+        return False
+    ratio = np.log10(np.sum(one) / np.sum(other))
+    return bool(abs(ratio - np.round(ratio)) < 1e-3)
+
+
 def _stands(columns: Columns, name: str) -> bool:
     """Whether a clock has one value in all rows, as that of a receiver without satellites: it is no clock."""
     try:
@@ -173,7 +227,7 @@ def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names:
             steps = np.diff(columns.clock(name)[0])
             counts = np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name)
             found.append((name, bool(counts)))
-    clocks = _as_long(columns, choice, [name for name, counts in found if not counts])
+    clocks = _own(columns, choice, _as_long(columns, choice, [name for name, counts in found if not counts]))
     if len(clocks) == 1:
         choice.time = (clocks[0],)
         choice.guesses.append(

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.formats.behaviour import clock_readings, size
+from truenorth.formats.behaviour import EPOCH, clock_readings, size
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.chosen import Choice
-from truenorth.formats.columns import DAY, Columns, missing_column
+from truenorth.formats.clock_face import FEWEST, is_clock_face, of_clock_face
+from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.records import Guess
@@ -24,11 +25,10 @@ Array = NDArray[np.float64]
 INTERVALS = ("ts", "Ts", "dt", "interval")
 FREQUENCIES = ("fs", "Fs", "sampling_rate", "samplingRate", "sample_rate", "sampleRate", "sampling_frequency")
 RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|sps\b|$)", re.IGNORECASE)
-FEWEST = 50  # rows, from which a log shows by itself what its numbers are
 BUNCHED = 1.2  # mean over median step, from which stamps are of a computer that read several rows at once
 BUNCH_SHARE = 0.05  # of the steps that are longer than 1.5 median ones, or zero; gaps are fewer
 TENTH_MS = "0.1 ms"
-FASTEST_FINE = 500.0  # Hz, of an Xsens's log
+FASTEST_FINE, SLOWEST_FINE = 500.0, 2.0  # Hz, of an Xsens's log
 SPAN = 0.02  # by which the stamps' span and that of a given rate may differ
 
 
@@ -55,6 +55,8 @@ def clock_of_log(
         )
     if stated == TENTH_MS and "time" not in layout.units and len(raw) > 2:
         stated = _fine(raw, source)
+        if stated == "us":
+            choice.device["gyro"] = ("deg/s", "an Xsens DOT's, whose clock counts microseconds, are in deg/s")
     if layout.rate is None:
         _check_bunches(raw, said, stated, source, guesses)
     elif np.all(np.diff(raw) >= 0.0) and raw[-1] > raw[0]:
@@ -63,6 +65,8 @@ def clock_of_log(
     if said is not None:
         guesses.append(Guess("time", said, why))
         return raw, layout
+    if len(choice.time) == 1 and (anew := columns.anew.get(choice.time[0])) is not None:
+        guesses.append(Guess("clock", anew, "each step back is the usual step but for the period, and begins at zero"))
     if "time" in layout.units:
         guesses.append(Guess("unit of time", layout.units["time"], "as the caller says", 1.0, {"units": layout.units}))
         return times(raw, unit_factor("time", "rates", layout)), layout
@@ -72,29 +76,14 @@ def clock_of_log(
     return times(raw, size(_unit_of_time(raw, source, guesses))), layout
 
 
-def is_clock_face(raw: Array) -> bool:
-    """Whether numbers are hours, minutes and seconds as ``101259.98``: no second reaches 60, and each minute begins with a jump."""
-    if len(raw) < FEWEST or not np.all((raw >= 0.0) & (raw < 240000.0)) or not np.all(raw % 100.0 < 60.0):
-        return False
-    steps, minutes = np.diff(raw), np.diff(raw // 100.0)
-    step = float(np.median(steps[minutes == 0.0])) if np.any(minutes == 0.0) else 0.0
-    jumps = steps[(minutes == 1.0) & (raw[1:] % 100.0 < 2.0) & (raw[:-1] % 100.0 > 58.0)]
-    whole = np.any(minutes > 0.0) and np.all(raw % 10000.0 < 6000.0)
-    return bool(
-        whole and 0.0 < step <= 1.0 and jumps.size and np.all(np.abs(jumps - 40.0 - step) < max(0.5 * step, 1e-3))
-    )
-
-
-def of_clock_face(raw: Array) -> Array:
-    """Seconds of the day of numbers such as ``101259.98``; they go on after midnight."""
-    time = raw // 10000.0 * 3600.0 + raw // 100.0 % 100.0 * 60.0 + raw % 100.0
-    return np.asarray(time + DAY * np.concatenate([[0.0], np.cumsum(np.diff(time) < -DAY / 2)]))
-
-
 def _fine(raw: Array, source: str) -> str:
-    """What a count of an Xsens's ``SampleTimeFine`` is: 0.1 ms of an MTi, 1 us of a DOT."""
+    """What a count of an Xsens's ``SampleTimeFine`` is: 0.1 ms of an MTi, 1 us of a DOT; ms where others write dates there."""
+    if EPOCH[0] < raw[0] * 1e-3 < EPOCH[1]:
+        return "ms"
     step = float(np.median(np.diff(raw)))
-    slow = [unit for unit in (TENTH_MS, "us") if step * size(unit) * FASTEST_FINE >= 1.0]
+    slow = [
+        unit for unit in (TENTH_MS, "us") if FASTEST_FINE * step * size(unit) >= 1.0 >= SLOWEST_FINE * step * size(unit)
+    ]
     readings = clock_readings(step, float(raw[0]), slow or (TENTH_MS, "us"))
     return take("unit of time", readings, [{"units": {"time": r.unit}} for r in readings], source, []).unit
 

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
 from truenorth.formats.arrow import to_numpy
+from truenorth.formats.dates import dates_of
 from truenorth.formats.layout import BLOCKS
+from truenorth.formats.wraps import unwrapped
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -25,7 +27,6 @@ DAY = 86400.0
 OURS = tuple(name for pair in BLOCKS.values() for name in pair)  # arrays of three columns with our names
 
 SECONDS = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)? (?:s|sec|min|hr)", re.IGNORECASE)  # MATLAB's ``0.01 sec``
-DAY_FIRST = re.compile(r"\d{1,2}\.\d{1,2}\.\d{4} ")  # a date with points
 MOST_NAMES, LONGEST_NAME = 40, 60  # of a message
 
 
@@ -51,6 +52,10 @@ class Columns:
         By what that was found.
     whole : mapping
         Arrays of doubles that are there as they stand, in memory or on the disk, by the names of their columns.
+    anew : dict
+        What the clocks are that were read and start anew, by name: :meth:`clock` writes it.
+    rows : mapping
+        How many rows each column has, of a file of arrays, which may be those of several devices; empty for a table.
     """
 
     path: Path
@@ -63,15 +68,27 @@ class Columns:
     why: str = "the format's own order"
     above: tuple[str, ...] = ()
     whole: Mapping[tuple[str, ...], Array] = field(default_factory=dict)
+    anew: dict[str, str] = field(default_factory=dict)
+    rows: Mapping[str, int] = field(default_factory=dict)
 
     def clock(self, name: str) -> tuple[Array, str | None]:
         """A column of time, and what it holds: ``"dates"`` and ``"times of day"`` are in seconds, None is bare numbers.
+
+        A clock that unmistakably starts anew goes on (:mod:`truenorth.formats.wraps`).
 
         Raises
         ------
         DataError
             A cell that is neither.
         """
+        time, said = self._clock(name)
+        if said is None:
+            time, anew = unwrapped(time)
+            if anew is not None:
+                self.anew[name] = anew
+        return time, said
+
+    def _clock(self, name: str) -> tuple[Array, str | None]:
         if (name,) in self.whole:
             return self.whole[name,], None
         import pyarrow as pa
@@ -101,11 +118,8 @@ class Columns:
 
         plain = pd.Series([cell.strip() for cell in cells])
         try:
-            if "-" in cells[0] or "/" in cells[0] or DAY_FIRST.match(cells[0].strip()):
-                stamps = pd.to_datetime(
-                    plain, format="mixed", utc=True, dayfirst=DAY_FIRST.match(cells[0].strip()) is not None
-                )
-                return np.asarray(stamps.to_numpy("datetime64[ns]").astype(np.int64) * 1e-9, dtype=np.float64), "dates"
+            if "-" in cells[0] or "/" in cells[0] or re.match(r"\s*\d{1,2}\.\d{1,2}\.\d{4} ", cells[0]):
+                return dates_of(plain)
             if ":" in cells[0]:
                 time = pd.to_timedelta(plain.where(plain.str.count(":") == 2, "00:" + plain))
                 return _unwrapped(
@@ -173,7 +187,7 @@ def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
         part = parts[name]
         return pa.chunked_array([pa.array(part if part.dtype.kind in "mM" else part.astype(np.float64))])
 
-    return Columns(path, list(parts), read, column, whole=whole)
+    return Columns(path, list(parts), read, column, whole=whole, rows={name: len(part) for name, part in parts.items()})
 
 
 def listed(names: Sequence[str]) -> str:

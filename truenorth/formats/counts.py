@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 
 SCALES = {"gscale": ("gyro", "rad/s"), "ascale": ("accel", "g"), "tscale": ("time", "s")}
+ORIENTATION = re.compile(r'\W*orientation"?\s*[,;:=\t ]\s*"?([XYZxyz]{3})"?\W*', re.IGNORECASE)
 LINE = re.compile(r'\W*(gscale|ascale|tscale|acc_1g)"?\s*[,;:=\t ]\s*"?([\d.]+(?:e[+-]?\d+)?)"?\W*', re.IGNORECASE)
 
 
@@ -28,3 +29,12 @@ def counts_above(above: Sequence[str]) -> dict[str, str]:
             sensor, unit = SCALES[match[1].lower()]
             found[sensor] = f"{float(match[2]):.9g} {unit}"
     return found
+
+
+def orientation_above(above: Sequence[str]) -> str | None:
+    """How Gyroflow's log says that its sensor sits in the camera, such as ``YxZ``: small letters turn a sign; None: it does not.
+
+    The camera's axes are no vehicle's. What is read are the sensor's own axes, and a note says so.
+    """
+    found = (ORIENTATION.fullmatch(line.strip()) for line in above)
+    return next((match[1] for match in found if match is not None and set(match[1].lower()) == set("xyz")), None)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from truenorth.core.errors import DataError
@@ -26,6 +26,8 @@ THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+", re.ASCII)
 QUOTED = re.compile(r'"\s*([+-]?\d+,\d+)\s*"', re.ASCII)  # a decimal comma between columns that commas divide
 EITHER = ".,"  # decimal points in some columns, commas in others
 SAMPLE = 40  # lines by which the dialect is judged
+FEWEST_CELLS = 3  # of a line that may be a row of another table
+MOST_BELOW, MOST_ABOVE = 1, 10  # of such lines that may stand below a header, and above it: a cut row, a matrix
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,55 @@ def dialect_of(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
 def is_remark(line: str) -> bool:
     """Whether a line is a remark."""
     return line.lstrip().startswith(REMARKS)
+
+
+def notes_on_other_rows(
+    source: str, dialect: Dialect, above: Sequence[tuple[int, str]], used: Collection[int], count: int
+) -> tuple[str, ...]:
+    """What to say of lines of numbers above the first whole row, which are not read.
+
+    Parameters
+    ----------
+    source : str
+        The file's name.
+    dialect : Dialect
+    above : sequence of (int, str)
+        The lines above the first whole row, numbered.
+    used : collection of int
+        Those of them that are the header; none where there is none.
+    count : int
+        Columns of the table.
+
+    Raises
+    ------
+    DataError
+        So many of them that they are rows: with the first one's line.
+    """
+    header = max(used, default=-1)
+    notes: list[str] = []
+    for below in (True, False):
+        lines = [
+            (n, dialect.cells(line))
+            for k, (n, line) in enumerate(above)
+            if (k > header) == below and not is_remark(line)
+        ]
+        plain = [(n, cells) for n, cells in lines if cells and all(map(dialect.is_number, cells))]
+        rows = [(n, cells) for n, cells in lines if len(cells) >= FEWEST_CELLS and _are_numbers(dialect, cells)]
+        if len(rows) > (MOST_BELOW if below and header >= 0 else MOST_ABOVE):
+            number, cells = rows[0]
+            raise DataError(
+                f"{source}: line {number}: {len(cells)} columns, as in {len(rows)} lines above the rows of {count} columns; "
+                "expected one table: save each part as a log of its own, or remove the lines that are cut"
+            )
+        said = sorted({n for n, _ in [*(plain if below else []), *rows]})
+        if said:
+            where = "lines of numbers that are no whole row" if below else "lines of numbers above the header"
+            notes.append(f"{where} left out: {len(said)}, the first is line {said[0]}")
+    return tuple(notes)
+
+
+def _are_numbers(dialect: Dialect, cells: Sequence[str]) -> bool:
+    return dialect.share(cells) >= 0.5 and sum(map(dialect.is_number, cells)) > 0.5 * len(cells)
 
 
 def with_points(source: str, text: bytes, skip: int, names: Sequence[str], dialect: Dialect) -> bytes:

@@ -214,11 +214,12 @@ def _local(found: Found, origin: Position | None) -> dict[str, Any]:
 
 
 def _velocity(found: Found) -> Array | None:
-    """Velocity in n, from its components or from speed and course."""
+    """Velocity in n, from its components, or from speed and course with the component up where the log has it."""
     v_n, of_phone = found.stack("VE", "VN", "VU"), speed_and_bearing(found)
-    if v_n is None and (of_phone is not None or found.has("speed", "course")):
+    if not (found.has("VE") or found.has("VN")) and (of_phone is not None or found.has("speed", "course")):
         speed, course = of_phone or (found.values["speed"], found.values["course"])
         # A receiver that stands still leaves its course empty.
         course = np.where((speed == 0.0) & np.isnan(course), 0.0, course)
-        v_n = np.column_stack([speed * np.sin(course), speed * np.cos(course), np.full(len(speed), np.nan)])
+        up = found.values.get("VU", np.full(len(speed), np.nan))
+        v_n = np.column_stack([speed * np.sin(course), speed * np.cos(course), up])
     return v_n

@@ -23,11 +23,20 @@ def columns_of(path: Path, format: str, named: bool = True) -> Columns:
         A damaged file, or one without a table.
     """
     if format in ("csv", "kf-gins", "psins"):
+        from truenorth.formats import vbo
+        from truenorth.formats.labelled import NOTE
         from truenorth.formats.text import open_table
 
+        if vbo.is_one(path):
+            return vbo.columns(path)
         table = open_table(path)
-        notes = (*table.notes, table.dialect.words())
-        why = "the dialect in which most lines are rows of numbers"
+        labelled = NOTE in table.notes
+        notes = table.notes if labelled else (*table.notes, table.dialect.words())
+        why = (
+            "most lines are pairs of a name and a number"
+            if labelled
+            else "the dialect in which most lines are rows of numbers"
+        )
         return Columns(path, table.names, table.read, table.column, table.place, table.named, notes, why, table.above)
     if format == "sensor-folder":
         from truenorth.formats import sensor_folder

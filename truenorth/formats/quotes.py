@@ -16,31 +16,12 @@ from truenorth.formats.content import REMARKS_BYTES
 NUMBER_OR_STAMP = rb"[+-]?\.?\d[\w.:/+-]*(?: \d\d?:[\d:.]+)?"
 # A line that one pair of quotes holds, with its separators.
 WHOLE_ROW = re.compile(rb"""(?m)^[ \t]*(["'])([^"'\r\n]*[,;\t| ][^"'\r\n]*)\1[ \t]*(?=\r?$)""")
-# A quoted cell that ends with the end of a line: what a device said, with its line end, written as one cell.
-ENDS_INSIDE = re.compile(rb"""(?m)((?:^|[,;\t|]) ?"[^"\r\n]+)([\r\n]+)(?="(?:[,;\t|]|\r?$))""")
-REMOVED = b"\0"  # a line end, until its row has ended
 SINGLE_WITH_COMMA = re.compile(rb"'[+-]?\d+,\d+'")  # a decimal comma inside quotes: not to be cut
 
 
 def without_outer_quotes(text: bytes) -> bytes:
     """Take off the quotes around whole rows, and single ones at numbers."""
     return without_single_quotes(without_row_quotes(text))
-
-
-def without_ends_in_quotes(text: bytes) -> tuple[bytes, str | None]:
-    """Take out the line ends with which quoted cells end, so that a row is a line; and a note of how many they were.
-
-    Scripts that write the line of a device next to its numbers, as one quoted cell, leave that line's own end in the cell. Behind
-    its row an empty line is left for each, so that lines keep their numbers.
-    """
-    if re.search(rb'[\r\n]"', text) is None:
-        return text, None
-    bare, count = ENDS_INSIDE.subn(lambda cell: cell[1] + REMOVED * len(cell[2].splitlines()), text)
-    if not count:
-        return text, None
-    lines = bare.splitlines(keepends=True)
-    kept = [line.replace(REMOVED, b"") + b"\n" * line.count(REMOVED) for line in lines]
-    return b"".join(kept), f"quoted cells that end with the end of a line: {count}"
 
 
 def without_single_quotes(text: bytes) -> bytes:

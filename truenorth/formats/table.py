@@ -30,7 +30,7 @@ from truenorth.formats.choice import choose
 from truenorth.formats.chosen import Choice
 from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
-from truenorth.formats.counts import counts_above
+from truenorth.formats.counts import counts_above, orientation_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.formats.names import heading_of, plain
@@ -44,6 +44,7 @@ Array = NDArray[np.float64]
 RATE = re.compile(r"rate|gyr|omega|vel|speed|dps|rad_s|deg_s|(?:^|_)w(?:_|[xyz]|$)|ω")
 ANGLE = re.compile(r"rot|ang|theta")
 AT_REST = 2e-3  # by which the specific force at rest in ug differs from gravity, with the sensors' errors
+CONTRADICTED = 1.0  # of the logarithm, by which gyros turn gravity too far in a unit that is not theirs
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
@@ -202,6 +203,10 @@ def _units(
                 f"{source}: columns {', '.join(choice.labels[1:4])} turn gravity by what they change by, as angles do; expected "
                 "rates: name the columns of the gyros", [own, {"units": {"gyro": "deg/s"}}, {"units": {"gyro": "rad/s"}}], guesses,
             )  # fmt: skip
+        known = choice.device.get("gyro")
+        if known is not None and not _contradicts(facts, known[0]):
+            guesses.append(Guess("unit of the gyros", known[0], known[1], 1.0, {"units": {"gyro": known[0]}}))
+            return kind, {**said, "gyro": known[0]}
         readings = gyro_readings(facts, kind, said["accel"])
         if not readings:
             raise DataError(
@@ -212,6 +217,11 @@ def _units(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
+
+
+def _contradicts(facts: GyroFacts, unit: str) -> bool:
+    """Whether gyros in the unit that their device writes turn gravity too far, or not enough, for any error of theirs."""
+    return facts.turned and abs(np.log(facts.turning.best_scale * size(unit))) > CONTRADICTED
 
 
 def _may_be_angles(names: Sequence[str], layout: Layout) -> bool:
@@ -288,6 +298,8 @@ def _axes(columns: Columns, layout: Layout, choice: Choice, accel: Array, guesse
     up = mean / size_ if size_ > 0.0 else np.zeros(3)
     axis = int(np.argmax(np.abs(up)))
     shown = f"the specific force points along ({up[0]:+.2f}, {up[1]:+.2f}, {up[2]:+.2f}), which is up at rest"
+    if (orientation := orientation_above(columns.above)) is not None:
+        shown = f"x, y and z are the sensor's own, the line orientation {orientation} is of a camera and not applied; {shown}"
     headerless = not columns.named and choice.time and columns.names.index(choice.time[0]) == 0
     if headerless and layout.kind == "increments" and up[2] < -FULL_UP:
         guesses.append(

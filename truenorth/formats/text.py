@@ -19,8 +19,19 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.content import REMARKS_BYTES, text_of
-from truenorth.formats.dialect import DELIMITERS, EITHER, SAMPLE, Dialect, dialect_of, is_remark, with_points
-from truenorth.formats.quotes import without_ends_in_quotes, without_outer_quotes, without_stray_quotes
+from truenorth.formats.dialect import (
+    DELIMITERS,
+    EITHER,
+    SAMPLE,
+    Dialect,
+    dialect_of,
+    is_remark,
+    notes_on_other_rows,
+    with_points,
+)
+from truenorth.formats.labelled import table_of_labels
+from truenorth.formats.line_ends import without_ends_in_quotes
+from truenorth.formats.quotes import without_outer_quotes, without_stray_quotes
 from truenorth.records import Record
 
 if TYPE_CHECKING:
@@ -33,6 +44,7 @@ MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
 MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
+SENTENCE = re.compile(r"\$?[A-Z]{5},.*\*[0-9A-F]{2}")
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
 
@@ -198,12 +210,20 @@ def open_table(path: Path) -> TextTable:
     head = _head(path, text)
     if not head:
         raise DataError(f"{path.name}: no header and no numbers; the file holds empty lines only")
+    if (labelled := table_of_labels(path.name, text, [line for _, line in head])) is not None:
+        said = tuple(one for one in (note, joined, *labelled.notes) if one is not None)
+        return without_a_cut_end(
+            TextTable(
+                path, labelled.text, labelled.names, True, Dialect(",", "."), labelled.skip, "", labelled.above, said
+            )
+        )
     dialect, count = dialect_of(head)
     text, mended = without_stray_quotes(
         path.name, text, dialect.delimiter, count, lambda cells: _are_row(dialect, cells, count)
     )
     head = _head(path, text) if mended else head
-    rows = [not is_remark(line) and _are_row(dialect, dialect.cells(line), count) for _, line in head]
+    no_row = [is_remark(line) or SENTENCE.fullmatch(line.strip()) is not None for _, line in head]
+    rows = [not no and _are_row(dialect, dialect.cells(line), count) for no, (_, line) in zip(no_row, head)]
     first = rows.index(True) if any(rows) else None
     notes = tuple(said for said in (note, joined, mended) if said is not None)
     if first is None:
@@ -211,20 +231,14 @@ def open_table(path: Path) -> TextTable:
     names, used = _header(path, dialect, head[:first], count, first_cells=dialect.cells(head[first][1]))
     above = tuple(line for k, (_, line) in enumerate(head[:first]) if k not in used)
     named = bool(used)
-    lost = [
-        head[k][0]
-        for k in range(max(used, default=-1) + 1, first)
-        if not is_remark(head[k][1]) and all(map(dialect.is_number, dialect.cells(head[k][1])))
-    ]
-    if lost:
-        notes += (f"lines of numbers that are no whole row left out: {len(lost)}, the first is line {lost[0]}",)
+    notes += notes_on_other_rows(path.name, dialect, head[:first], used, count)
     header = head[min(k for k in used if k >= 0)][1] if named else ""
     names = names if named else [str(i + 1) for i in range(count)]
     if dialect.decimal == EITHER:
         text = with_points(path.name, text, head[first][0] - 1, names, dialect)
         dialect = replace(dialect, decimal=".")
         notes += ("decimal points in some columns, commas in others",)
-    return _without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
+    return without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
 
 
 def _with_stamps_apart(text: bytes) -> bytes:
@@ -281,8 +295,8 @@ def _header(
     unit_line = -1
     for k in range(len(above) - 1, -1, -1):
         line = above[k][1]
-        if not line.strip(",;|\t "):
-            continue  # separators and nothing between them
+        if not line.strip(",;|\t ") or SENTENCE.fullmatch(line.strip()):
+            continue  # separators and nothing between them, or what a receiver says
         plain = line.lstrip("#%/ \t") if is_remark(line) else line
         for delimiter in (dialect.delimiter, *DELIMITERS):
             names = Dialect(delimiter, ".").cells(plain)
@@ -296,7 +310,7 @@ def _header(
             cells = dialect.cells(line)
             listed = dialect.delimiter is not None and not is_remark(line) and k == len(above) - 1
             # Numbers alone are no header but a row that lacks its beginning: a logger that was switched on in its midst.
-            if listed and len(cells) >= max(3, count // 2) and not all(map(dialect.is_number, cells)):
+            if listed and len(cells) >= max(3, count // 2) and dialect.share(cells) < 0.5:
                 raise DataError(
                     f"{path.name}: line {above[k][0]}: a header of {len(cells)} columns above rows of {count}; "
                     "expected as many of each: if commas stand both between columns and in decimals, write the log with "
@@ -355,7 +369,7 @@ def _without_rows(path: Path, text: bytes, head: list[tuple[int, str]], notes: t
     return TextTable(path, text, names, True, Dialect(DELIMITERS[cells.index(names)], "."), number, line, (), notes)
 
 
-def _without_a_cut_end(table: TextTable) -> TextTable:
+def without_a_cut_end(table: TextTable) -> TextTable:
     """Leave out a last line that a logger did not finish: too few cells, or no line end and a cell shorter than above."""
     blanks = b" \t" if table.dialect.delimiter != "\t" else b" "
     text = table.text.rstrip(b"\r\n" + blanks)

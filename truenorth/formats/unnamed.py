@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
@@ -30,7 +31,10 @@ PART = re.compile(r"(.+)\[\d+\]")  # a column of an array, and no unit behind a 
 
 def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three next to them."""
-    source = columns.path.name
+    source, whole = columns.path.name, columns
+    if columns.rows:  # of arrays those of the most rows: other devices' may come first, and be many
+        most = max(columns.rows.values())
+        columns = replace(columns, names=[name for name in columns.names if columns.rows[name] == most])
     numbers = {}
     for name in columns.names[:MOST_COLUMNS]:
         try:
@@ -41,7 +45,7 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     numbers = {name: v for name, v in numbers.items() if len(v) == longest}
     choice = Choice(None, (), [], named=False)
     if longest >= 3:
-        choice = with_time(columns, layout, choice)
+        choice = with_time(whole if "time" in layout.columns else columns, layout, choice)
     skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
     free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
     left_out = others_of(free, [list(three.values()) for three in _threes(free).values()]) if columns.named else set()
@@ -54,12 +58,12 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     if longest >= 3 and forces and len(blocks) < 2:
         raise DataError(
             f"{source}: columns {' '.join(forces[0])} show gravity, and no other three may be gyros among "
-            f"{listed(columns.names)}; expected rates about three axes next to specific forces: name the columns of the gyros"
+            f"{listed(whole.names)}; expected rates about three axes next to specific forces: name the columns of the gyros"
             + hint(columns.path)
         )
     if longest < 3 or not forces or len(blocks) < 2:
         raise DataError(
-            f"{source}: no columns of an IMU among {listed(columns.names)}; expected time, gyro_x .. accel_z (rates "
+            f"{source}: no columns of an IMU among {listed(whole.names)}; expected time, gyro_x .. accel_z (rates "
             "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
             + hint(columns.path)
         )

@@ -1,0 +1,30 @@
+"""Times that are written as a clock shows them, ``101259.98``: hours, minutes and seconds in one number."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FEWEST = 50  # rows, from which a log shows by itself what its numbers are
+DAY = 86400.0
+
+
+def is_clock_face(raw: Array) -> bool:
+    """Whether numbers are hours, minutes and seconds as ``101259.98``: no second reaches 60, and each minute begins with a jump."""
+    if len(raw) < FEWEST or not np.all((raw >= 0.0) & (raw < 240000.0)) or not np.all(raw % 100.0 < 60.0):
+        return False
+    steps, minutes = np.diff(raw), np.diff(raw // 100.0)
+    step = float(np.median(steps[minutes == 0.0])) if np.any(minutes == 0.0) else 0.0
+    jumps = steps[(minutes == 1.0) & (raw[1:] % 100.0 < 2.0) & (raw[:-1] % 100.0 > 58.0)]
+    whole = np.any(minutes > 0.0) and np.all(raw % 10000.0 < 6000.0)
+    return bool(
+        whole and 0.0 < step <= 1.0 and jumps.size and np.all(np.abs(jumps - 40.0 - step) < max(0.5 * step, 1e-3))
+    )
+
+
+def of_clock_face(raw: Array) -> Array:
+    """Seconds of the day of numbers such as ``101259.98``; they go on after midnight."""
+    time = raw // 10000.0 * 3600.0 + raw // 100.0 % 100.0 * 60.0 + raw % 100.0
+    return np.asarray(time + DAY * np.concatenate([[0.0], np.cumsum(np.diff(time) < -DAY / 2)]))
