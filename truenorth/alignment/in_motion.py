@@ -40,6 +40,7 @@ from truenorth.core.units import significant
 from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
+from truenorth.estimate.latency import rate_evidence
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.estimate.poorer import ALONE, BIASES, poorer_evidence, poorer_rivals, poorer_tracks
@@ -224,9 +225,9 @@ def _aligned(
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
-    more += (
-        [] if answer.moving is None else learnt_evidence(task.factors, answer.moving.delays, task.scatter, task.swings)
-    )
+    if (of := answer.moving) is not None:
+        more += learnt_evidence(task.factors, of.delays, task.scatter, task.swings)
+        more += rate_evidence(of.clocks, of.track)
     more += task.wanders
     more += _seen(task, track, guess, first, gated=passes > 1, gyrocompassed=method == "gyrocompass")
     return judge_moving(answer, last or track, heading_limit, more)
