@@ -96,12 +96,14 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         found.append(rows_of("position", place, measured, sigma, states))
     moving = record.has_velocity & sound
     if moving.any() and record.v_n is not None:
-        measured = record.v_n.copy()
+        measured = record.v_n / (1.0 - mounting.clock.rate)  # by the IMU's seconds
         if not heights:
             measured[:, 2] = np.nan
         sigma = _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
         states = _of_receiver(mounting, "GNSS", "lever arm", "lag")
         shown = rows_of("velocity", moving, measured, sigma, states)
+        if "lag" in states and states["lag"].drift > 0.0:
+            shown = replace(shown, figures=(1.0,))
         found.append(shown if mounting.velocities is None else _of_own_clock(shown, mounting))
     turned = record.has_heading & sound
     if turned.any() and record.heading is not None:

@@ -31,6 +31,7 @@ from truenorth.alignment.in_motion_untold import UNTOLD, hidden_from, of_level
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
+from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.suspect import name_specification
 from truenorth.core.earth import EARTH_RATE
@@ -277,7 +278,7 @@ def _seen(
 ) -> list[Evidence]:
     """What the receiver, the log itself, the earth's rate at rest and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
-    found += moving_evidence(task.record)
+    found += moving_evidence(task.record) + shift_evidence(task, track)
     if gyrocompassed:
         found += [*rest_evidence(task, track), *led_at_rest_evidence(task, track)]
         found += half_turn_evidence(task, track, gated=gated)

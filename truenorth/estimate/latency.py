@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.quality.swing import VELOCITIES
 from truenorth.state.evidence import Effect, Evidence, Figure, note
-from truenorth.state.layout import DP, DV
 from truenorth.state.limits import is_estimated
 from truenorth.state.mounting import LONGEST_ARM, Mounting
 from truenorth.state.track import Track
@@ -146,20 +145,14 @@ def rates_found(track: Track, antenna: Mounting) -> dict[str, tuple[float, float
 
 
 def rate_evidence(rates: Mapping[str, tuple[float, float]], track: Track) -> list[Evidence]:
-    """That a receiver's clock and the IMU's run apart, and what is not in sigma of it: which of the two shows a second.
-
-    A second that is long by `e` makes velocities by the IMU and by places long by `e v`, and those of the receiver not. The filter
-    lets them disagree for as long as places need to correct its velocity, about the ratio of the sigmas of the two (ours).
-    """
+    """That a receiver's clock and the IMU's run apart: delays are in sigma, velocities are metres in a second of the IMU's."""
     best = min(rates.values(), key=lambda rate: rate[1], default=(0.0, 0.0))
     if abs(best[0]) <= SHOWN_DELAY * best[1]:
         return []
     key = "clock.runs_fast" if best[0] < 0.0 else "clock.runs_slow"
     dv = abs(best[0]) * float(np.linalg.norm(track.v_n, axis=1).max())
-    own, place = (float(track.sigma[-1, part][:2].max()) for part in (DV, DP))
-    effect = Effect(velocity=dv, position=dv * place / own if own > 0.0 else 0.0)
     figures: dict[str, Figure] = {"name": "GNSS", "size": 1e6 * abs(best[0]), "sigma": 1e6 * best[1]}
-    return [Evidence(key, figures, kind="hint", effect=effect)]
+    return [Evidence(key, figures, kind="hint", effect=Effect(velocity=dv))]
 
 
 def delay_notes(delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:
