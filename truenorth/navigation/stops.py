@@ -33,7 +33,7 @@ LEAST_ANGLE = 1e-9  # rad: of a simulated IMU that nothing shakes
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
 LONG_ENOUGH = 30.0  # s: of fewer epochs a filter does not separate a base's motion from its rate
 CALM = 5.0  # times the acceleration of nearly all seconds at rest: a vehicle that moves pushes more
-TOLD = 6.0  # times the usual difference of rates of two seconds at rest, from which a rate is another
+DIFFERS = 6.0  # times the usual difference of rates of two seconds at rest, from which a rate is another
 MOST_VOTES = 300  # seconds that say what the usual rate is
 APART = 1.5  # s: seconds further apart are two rests
 SPREAD = 0.25  # s before and after the middle of a second at rest, between which its row is drawn
@@ -81,13 +81,13 @@ def turned_in_stops(
         return np.empty(0), np.empty((0, 3))
     calm = motion.acceleration <= CALM * float(np.quantile(motion.acceleration[rest], 0.95))
     apart = float(np.median(np.linalg.norm(np.diff(motion.rate[rest], axis=0), axis=1)))  # from second to second
-    near = max(BIAS_CHANGE, TOLD * apart)
+    near = max(BIAS_CHANGE, DIFFERS * apart)
     some = motion.rate[rest][:: max(1, int(rest.sum()) // MOST_VOTES)]
     close = np.linalg.norm(some[:, None] - some, axis=2) < 0.5 * near
     at, off = motion.time - 0.5, motion.rate - np.median(some[close[np.argmax(close.sum(axis=1))]], axis=0)
-    told = calm & (np.linalg.norm(off, axis=1) > near)
-    told &= _standing(at, [_speed_of(log) for log in logs if log is not None])
-    return at[told], off[told]
+    another = calm & (np.linalg.norm(off, axis=1) > near)
+    another &= _standing(at, [_speed_of(log) for log in logs if log is not None])
+    return at[another], off[another]
 
 
 def seconds_at_rest(
