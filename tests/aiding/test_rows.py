@@ -1,5 +1,7 @@
 """Measurement rows against finite differences of the predicted measurement itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,9 +26,10 @@ from truenorth.strapdown import wander
 LAT, LON, ALT = 1.2, -2.0, 500.0
 MODEL = InsModel(0.0, 0.0, groups=(Group("slow gyro bias", np.full(3, 1e-6), 300.0),))
 W_B = np.array([0.3, -0.2, 0.5])
-
+DRIFTING = "velocity by another clock"
 
 ROWS = {**KINDS, "odometer": WHEEL, "heading": HEADING, "magnetic field": FIELD, "smoothed velocity": SMOOTHED_VELOCITY}
+ROWS[DRIFTING] = KINDS["velocity"]
 
 LATE = {"body velocity": 0.05, "odometer": 0.05, "heading": 0.02 * np.linalg.norm(W_B)}
 
@@ -35,13 +38,15 @@ def _aiding(kind):
     states = {}
     for role, length in ROWS[kind].sizes.items():
         states |= state("sensor", role, np.ones(length))
+    if kind == DRIFTING:
+        states["lag"] = replace(states["lag"], drift=1e-4)
     measured = {
         "position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0],
         "heading": [0.3],
         "smoothed velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6],
     }.get(kind, [1.0, 2.0, 3.0])
     C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
-    figures = {"magnetic field": (0.05, 0.4, -0.9), "odometer": COUNTED_FORWARD}.get(kind, ())
+    figures = {"magnetic field": (0.05, 0.4, -0.9), "odometer": COUNTED_FORWARD, DRIFTING: (1.0,)}.get(kind, ())
     arm = np.array([1.0, -2.0, 3.0])
     return Aiding("sensor", ROWS[kind], [0.0], [measured], [[1.0] * 3], arm, C_mb, states, figures=figures)
 
@@ -64,6 +69,8 @@ def _predicted(kind, dx):
     aux = np.zeros(n)
     for role, group in source.states.items():  # small-angle mounting is exact for small assumed angles only
         aux[model.layout.slice_of(group.name)] = 1e-4 if role == "mounting" else 0.02
+        if group.drift > 0.0:  # small as well: the row is linear in it
+            aux[model.layout.slice_of(group.name).stop - 1] = 1e-4
     x = -dx.copy()
     feed_back(s, aux, x, np.zeros(0, np.int64))
     m = memory(s, aux, np.eye(n), 0.0, 1)
@@ -106,7 +113,7 @@ def test_row_is_the_derivative_of_the_prediction(kind):
 
 
 def _extra_states(kind):
-    return sum(ROWS[kind].sizes.values())
+    return sum(ROWS[kind].sizes.values()) + (kind == DRIFTING)
 
 
 @pytest.mark.parametrize("w", [(0.0, 0.0, 0.3), (0.05, -0.1, 0.2)])

@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import load, padded
-from truenorth.errors.dynamics import dynamics_of, noise_of_pairs, second_order
+from truenorth.errors.dynamics import couple_pairs, dynamics_of, noise_of_pairs, second_order
 from truenorth.errors.group import Group
 from truenorth.estimate.correct import touched, update_held
 from truenorth.estimate.predict import propagate_errors
@@ -29,6 +29,29 @@ def test_a_process_of_second_order_is_its_matrix_exponential(zeta):
     np.testing.assert_allclose(Phi @ still @ Phi.T + Q[STATES:, STATES:], still, atol=1e-13)
     if zeta == 0.0:  # an oscillator has no noise
         np.testing.assert_allclose(Q, 0.0, atol=1e-13)
+
+
+def test_what_grows_at_a_steady_rate_is_its_matrix_exponential():
+    """Value and rate, and what both do to the INS; without noise."""
+    sigma, rate, T = 0.2, 1e-4, 0.9
+    group = Group("lag", [sigma], drift=rate)
+    np.testing.assert_array_equal(group.prior, [sigma, rate])
+    d = dynamics_of([group], np.zeros(STATES))
+    n = STATES + 2
+    A, F = np.zeros((n, n)), np.zeros((n, n))
+    F[:9, STATES:] = np.random.default_rng(2).standard_normal((9, 2))
+    A[:9, STATES:], A[STATES, STATES + 1] = F[:9, STATES:], 1.0
+    Phi, Q = np.eye(n) + T * F, np.ones((n, n))
+    couple_pairs(d, F, T, Phi, Phi.T.copy())
+    np.testing.assert_allclose(Phi, expm(A * T), atol=1e-14)
+    noise_of_pairs(d, Phi, Q)
+    np.testing.assert_array_equal(Q[STATES:, STATES:], 0.0)
+
+
+@pytest.mark.parametrize("more", [{"walk": 1.0}, {"correlation_time": 9.0}, {"frequency": 1.0}])
+def test_only_a_constant_grows(more):
+    with pytest.raises(UsageError, match="drift"):
+        Group("lag", [0.2], drift=1e-4, **more)
 
 
 def test_a_considered_state_counts_and_stays():

@@ -10,11 +10,14 @@ from tests.runs import some
 from truenorth.aiding.aids import Gnss
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.earth import earth_rate_n, normal_gravity
+from truenorth.core.errors import UsageError
 from truenorth.estimate.sensor_delay import gyros_later
 from truenorth.navigation import Mounting, navigate
 from truenorth.records import GnssRecord, ImuRecord
 from truenorth.records.specs import ImuSpec
+from truenorth.state.mounting import ONE_CLOCK, Drift
 from truenorth.state.state import Start
+from truenorth.state.track import Track
 
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
@@ -98,7 +101,7 @@ def test_a_delay_that_an_alignment_has_found_is_taken_over(drive):
     times = np.arange(1.0, 179.0)
     sound = fixes(motion, times, sigma=0.3)
     gnss = replace(sound, time=sound.time + 0.1)
-    found = replace(start, gnss_delay=(0.09, 0.01))
+    found = replace(start, gnss_delay=(0.09, 0.01), gnss_drift=ONE_CLOCK)
     result = navigate(record, found, aid=Gnss(gnss), imu=SPEC)
     assert "gnss.delay_taken_over" in {item.key for item in result.evidence}
     assert not any(item.key.startswith("second_look") for item in result.evidence)
@@ -110,6 +113,49 @@ def test_a_delay_that_an_alignment_has_found_is_taken_over(drive):
     assert sigma < 0.01
     said = navigate(record, found, aid=Gnss(gnss, Mounting(latency=0.1)), imu=SPEC)
     assert "gnss.delay_taken_over" not in {item.key for item in said.evidence}
+
+
+@pytest.mark.parametrize("ppm", some([0.0, 500.0], [-500.0, 100.0, 1e4]))
+def test_clocks_that_run_apart(drive, ppm):
+    """Delay and rate at the end; of a clock that is off by 1 % the velocity, too, which the two count by seconds of their own."""
+    motion, record, start = drive
+    fast = 1.0 + 1e-6 * ppm
+    sound = fixes(motion, np.arange(1.0, 179.0), sigma=0.3)
+    gnss = replace(sound, time=sound.time + 0.1)
+    logged = replace(record, time=record.time * fast)
+    result = navigate(logged, start, aid=Gnss(gnss, Mounting(latency_sigma=0.2)), imu=SPEC)
+    assert result.status == "navigated"
+    lag = result.estimated()["GNSS lag"]
+    end = result.track.time[-1]
+    true = 0.1 + end * (1.0 / fast - 1.0)
+    assert abs(lag["value"][0] - true) < 4.0 * lag["sigma"][0] < 0.3
+    assert abs(lag["value"][1] - (1.0 - fast)) < 4.0 * lag["sigma"][1]
+    said = {item.key for item in result.evidence if item.key.startswith("clock.")}
+    assert said <= ({"clock.runs_fast"} if ppm >= 500.0 else {"clock.runs_slow"} if ppm < 0.0 else set())
+    error = result.track[-1:].errors_against(Track.along(motion.states(np.array([end / fast]))))[0]
+    assert np.all(np.abs(error) < 4.0 * result.track.sigma[-1, :9])
+
+
+def test_a_rate_that_an_alignment_has_found_is_taken_over(drive):
+    motion, record, start = drive
+    sound = fixes(motion, np.arange(1.0, 179.0), sigma=0.3)
+    gnss = replace(sound, time=sound.time + 0.1)
+    logged = replace(record, time=record.time * (1.0 - 3e-4))
+    found = replace(start, gnss_delay=(0.1, 0.02), gnss_drift=Drift(3e-4, 3e-5, start.time))
+    lag = navigate(logged, found, aid=Gnss(gnss), imu=SPEC).estimated()["GNSS lag"]
+    assert abs(lag["value"][0] - 0.1 - 3e-4 * record.time[-1]) < 4.0 * lag["sigma"][0] < 0.06
+    assert abs(lag["value"][1] - 3e-4) < 4.0 * lag["sigma"][1] < 1.3e-4
+
+
+def test_stamps_of_a_clock_that_runs_apart():
+    """What is late at a stamp, and the stamp of what holds then, undo each other."""
+    mounting = Mounting(latency=0.3, drift=Drift(0.01, 0.0, 7.0))
+    stamps = np.array([0.0, 7.0, 500.0])
+    np.testing.assert_allclose(mounting.late_at(stamps), 0.3 + 0.01 * (stamps - 7.0))
+    np.testing.assert_allclose(mounting.stamped(stamps - mounting.late_at(stamps)), stamps, atol=1e-12)
+    assert Mounting().clock.rate_sigma == 0.0  # a latency that is known stays as it is
+    with pytest.raises(UsageError, match="drift"):
+        Mounting(drift=Drift(np.nan, 0.0, 0.0))
 
 
 def test_an_arm_that_is_estimated_is_shown_whole(drive):

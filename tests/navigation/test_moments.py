@@ -16,7 +16,7 @@ from truenorth.aiding.sensors import from_gnss
 from truenorth.navigation import Mounting, navigate
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import ideal_log, simulate
-from truenorth.state.mounting import Clock
+from truenorth.state.mounting import QUARTZ, Clock
 
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
@@ -124,4 +124,4 @@ def test_both_delays_of_an_alignment_are_gone_on_with(tmp_path):
         result = truenorth.navigate(record, start, aid=[Gnss(gnss)], check_clocks=False)
         assert "gnss.delay_taken_over" in {item.key for item in result.evidence}
         priors = dict(zip(result.track.layout.names, result.track.layout.priors, strict=True))
-        assert (priors["GNSS lag"], priors["GNSS velocity lag"]) == ((0.03,), (0.02,))
+        assert (priors["GNSS lag"], priors["GNSS velocity lag"]) == ((0.03, QUARTZ), (0.02, QUARTZ))

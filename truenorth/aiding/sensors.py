@@ -47,6 +47,14 @@ def states_of(mounting: Mounting, name: str, *roles: Role) -> dict[Role, Group]:
     return found
 
 
+def _of_receiver(mounting: Mounting, name: str, *roles: Role) -> dict[Role, Group]:
+    """States of a receiver, whose clock may run at another rate than the IMU's."""
+    found = states_of(mounting, name, *roles)
+    if "lag" in found:
+        found["lag"] = replace(found["lag"], drift=mounting.clock.rate_sigma)
+    return found
+
+
 def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -> list[Aiding]:
     """Positions and velocities of an antenna, and the heading of the line to a second one.
 
@@ -66,7 +74,7 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         Velocities that contradict the positions, and how they would fit (see :func:`check_frames`).
     """
     check_frames(record)
-    time = record.time - mounting.latency
+    time = record.time - mounting.late_at(record.time)
     sound = np.ones(len(record), dtype=bool) if record.quality is None else ~np.isin(record.quality, (0, 6))
     found = []
 
@@ -82,22 +90,24 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         sigma = _position_sigma(record, POSITION_SIGMA if mounting.noise is None else np.full(3, mounting.noise))
         if not heights:
             measured[:, 2] = np.nan
-        states = states_of(mounting, "GNSS", "lever arm", "lag")
+        states = _of_receiver(mounting, "GNSS", "lever arm", "lag")
         if mounting.slow > 0.0:
             states |= state("GNSS", "bias", mounting.slow * _axes(sigma[place]), mounting.bias_time)
         found.append(rows_of("position", place, measured, sigma, states))
     moving = record.has_velocity & sound
     if moving.any() and record.v_n is not None:
-        measured = record.v_n.copy()
+        measured = record.v_n / (1.0 - mounting.clock.rate)  # by the IMU's seconds
         if not heights:
             measured[:, 2] = np.nan
         sigma = _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
-        states = states_of(mounting, "GNSS", "lever arm", "lag")
+        states = _of_receiver(mounting, "GNSS", "lever arm", "lag")
         shown = rows_of("velocity", moving, measured, sigma, states)
+        if "lag" in states and states["lag"].drift > 0.0:
+            shown = replace(shown, figures=(1.0,))
         found.append(shown if mounting.velocities is None else _of_own_clock(shown, mounting))
     turned = record.has_heading & sound
     if turned.any() and record.heading is not None:
-        states = states_of(mounting, "GNSS", "lag")
+        states = _of_receiver(mounting, "GNSS", "lag")
         if mounting.angle_sigma > 0.0:
             states["bias"] = Group("GNSS heading bias", np.array([mounting.angle_sigma]), unit="rad")
         said = None if record.heading_sigma is None else record.heading_sigma[:, None]
@@ -121,7 +131,7 @@ def _of_own_clock(source: Aiding, mounting: Mounting) -> Aiding:
     """A receiver's velocities with the delay that is theirs alone."""
     own = mounting.of_velocities
     others = {key: group for key, group in source.states.items() if key != "lag"}  # that is of the places
-    states = others | states_of(replace(mounting, latency_sigma=own.latency_sigma), source.name, "lag")
+    states = others | _of_receiver(replace(mounting, latency_sigma=own.latency_sigma), source.name, "lag")
     return replace(source, time=source.time + mounting.latency - own.latency, states=states)
 
 

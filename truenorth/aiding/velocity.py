@@ -9,15 +9,20 @@ that: with q the part of w that is quicker than its filter, and d the arm whose 
 
 So an arm that nobody has said is known by slow turns and by places, and what is quick says how much of it is shown, l - d, alone.
 Else the swing that is missing would be a shorter arm (ours; :mod:`truenorth.quality.swing`).
+
+A receiver counts metres by seconds of its own. Where those run apart from the IMU's, its delay grows by r a second, and of the
+velocity y by the IMU's seconds it shows ``(1 - r) y``. Without this a place and a velocity that agree in the receiver's seconds
+would say that the clocks do.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 from truenorth.aiding.position import convergence, into_north
-from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_FILTER, AT_LAG, AT_OWN, Row, lag_now, row, with_state
+from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_FILTER, AT_LAG, AT_OWN, OWN, Row, lag_now, row, with_state
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
@@ -87,6 +92,13 @@ def _shown(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, unseen:
     lag = lag_now(now, assumed, at[AT_LAG])
     C, w_b, push = matrix_of(now, NOW_C), vector_of(now, NOW_TURN), vector_of(now, NOW_PUSH)
     velocity_row(now, C, w_b, push, arm, unseen, lag, at[AT_ARM], at[AT_LAG], measured, H, z)
+    if figures[OWN] > 0.0 and at[AT_LAG] >= 0:  # the delay grows
+        rate = at[AT_LAG] + 1
+        for j in range(3):
+            if not math.isnan(measured[j]):
+                y = z[j] + measured[j]
+                H[j, rate] = y
+                z[j] -= assumed[rate] * y
     if at[AT_OWN] >= 0:
         for j in range(2):
             z[j] += assumed[at[AT_OWN] + j]

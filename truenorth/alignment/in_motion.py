@@ -31,6 +31,7 @@ from truenorth.alignment.in_motion_untold import UNTOLD, hidden_from, of_level
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
+from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.suspect import name_specification
 from truenorth.core.earth import EARTH_RATE
@@ -40,6 +41,7 @@ from truenorth.core.units import significant
 from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
+from truenorth.estimate.latency import rate_evidence
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.estimate.poorer import ALONE, BIASES, poorer_evidence, poorer_rivals, poorer_tracks
@@ -224,9 +226,9 @@ def _aligned(
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
-    more += (
-        [] if answer.moving is None else learnt_evidence(task.factors, answer.moving.delays, task.scatter, task.swings)
-    )
+    if (of := answer.moving) is not None:
+        more += learnt_evidence(task.factors, of.delays, task.scatter, task.swings)
+        more += rate_evidence(of.clocks, of.track)
     more += task.wanders
     more += _seen(task, track, guess, first, gated=passes > 1, gyrocompassed=method == "gyrocompass")
     return judge_moving(answer, last or track, heading_limit, more)
@@ -276,7 +278,7 @@ def _seen(
 ) -> list[Evidence]:
     """What the receiver, the log itself, the earth's rate at rest and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
-    found += moving_evidence(task.record)
+    found += moving_evidence(task.record) + shift_evidence(task, track)
     if gyrocompassed:
         found += [*rest_evidence(task, track), *led_at_rest_evidence(task, track)]
         found += half_turn_evidence(task, track, gated=gated)

@@ -17,7 +17,7 @@ from truenorth.core.earth import normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
-from truenorth.estimate.latency import delays_found
+from truenorth.estimate.latency import delays_found, rates_found
 from truenorth.records import OdometerRecord
 from truenorth.state.layout import ACCEL_AXES, ANTENNA_ARM, BA, BG, DP, GYRO_AXES, PHI
 from truenorth.state.track import Track
@@ -56,7 +56,7 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
         position = replace(position, horizontal_sigma=float(np.sqrt(np.diag(moving.P)[DP][:2].max())))
     elif spread.heading > 0.0:
         moving = moving.off_together(apart)
-    moving = replace(moving, delays=delays)
+    moving = replace(moving, delays=delays, clocks=rates_found(track, task.antenna))
     return Alignment(
         status="not_converged",
         evidence=(),

@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.alignment.in_motion_passes import begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.latency import SHOWN_DELAY, counted_from, delay_of
+from truenorth.estimate.latency import SHOWN_DELAY, as_it_runs, counted_from, delay_of
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
@@ -22,6 +23,8 @@ from truenorth.state.evidence import Effect, Evidence, Kind
 from truenorth.state.limits import limit, may_be_chance
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Residuals, Track
+
+Array = NDArray[np.float64]
 
 MORE_PASSES = 4  # of a log whose clocks are left open
 CLOCK_DIGITS = 6  # of a stamp, s
@@ -60,7 +63,7 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         task, track = open_, late
     seen = delay_of(track, "GNSS")
     if seen is not None:  # its column is that of no delay, and gyros that are later bring what it lacks
-        task = replace(task, antenna=replace(task.antenna, latency=task.antenna.latency + seen[0]))
+        task = replace(task, antenna=as_it_runs(task.antenna, track))
         track = task.run(guess, gated=gated)
 
     if isinstance(task.odometer, OdometerRecord):
@@ -114,15 +117,19 @@ def _of_open_clocks(task: MovingTask, guess: Guess, track: Track, first: Guess, 
 
 def _as_stamped(task: MovingTask, track: Track) -> list[Residuals]:
     """Residuals with the stamps of their logs, which the latency of a sensor has moved."""
-    lags = {
-        "GNSS position": task.antenna.latency,
-        VELOCITIES: task.antenna.of_velocities.latency,
-        "odometer": task.wheel.latency,
-        "velocity log": task.wheel.latency,
-    }
-    return [replace(r, stamp=np.round(r.stamp + lags.get(r.name, 0.0), CLOCK_DIGITS)) for r in track.residuals]
+    antenna, wheel = task.antenna, task.wheel
+    own = replace(antenna, latency=antenna.of_velocities.latency)
+    sensors = {"GNSS position": antenna, VELOCITIES: own, "odometer": wheel, "velocity log": wheel}
+
+    def stamps(r: Residuals) -> Array:
+        at = sensors[r.name].stamped(r.stamp) if r.name in sensors else r.stamp
+        return np.round(at, CLOCK_DIGITS)
+
+    return [replace(r, stamp=stamps(r)) for r in track.residuals]
 
 
 def _opened(mounting: Mounting) -> Mounting:
-    """A sensor whose clock is not taken for known."""
-    return mounting if mounting.latency_sigma > 0.0 else replace(mounting, latency_sigma=LATENCY_SIGMA)
+    """A sensor whose clock is not taken for known, as late all the time."""
+    if mounting.latency_sigma > 0.0:
+        return mounting
+    return replace(mounting, latency_sigma=LATENCY_SIGMA, drift=mounting.clock)

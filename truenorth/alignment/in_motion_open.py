@@ -121,7 +121,7 @@ def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
 def _led_back(task: MovingTask, model: InsModel, track: Track, until: float) -> _Motion:
     """The motion that a track leads back to, from as late as the gyros carry an attitude; constants as the end knows them."""
     row = max(1, int(np.searchsorted(track.time, until, side="right")))
-    values = np.zeros(model.states)
+    values, span = np.zeros(model.states), float(task.record.duration)
     for part in (BG, BA):
         values[part] = track.sensors[row - 1, part]
     for group in model.groups:
@@ -129,6 +129,9 @@ def _led_back(task: MovingTask, model: InsModel, track: Track, until: float) -> 
         constant = np.isinf(group.lasts).all() and np.isinf(group.correlation_distance) and group.frequency == 0.0
         if had is not None and own is not None and constant and group.walk == 0.0:
             values[own] = track.sensors[-1, had]
+            if group.drift > 0.0:  # what has grown is less at the beginning
+                first = slice(own.start, own.start + len(group.sigma))
+                values[first] -= values[first.stop : own.stop] * span
     return _Motion(backtracked(task.record, track[:row]), values)
 
 

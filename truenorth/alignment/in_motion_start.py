@@ -145,7 +145,7 @@ def start_at(
 def _by_gnss(gnss: GnssRecord, antenna: Mounting, time: float, end: float) -> tuple[Array, float]:
     """Velocity (3,) at a time by a receiver, m/s, and one sigma of it: what delays and differences of places do counts."""
     at = np.array([time, time + max(antenna.latency_sigma, 1e-3), end])
-    v = gnss_track(gnss, at, antenna.latency)[0]
+    v = gnss_track(gnss, at, antenna.late_at(time))[0]
     change = float(np.linalg.norm(v[1] - v[0]))
     fixes = gnss.time[gnss.has_position]
     by_places = 0.0

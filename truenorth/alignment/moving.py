@@ -68,6 +68,8 @@ class Moving:
         The whole way.
     delays : mapping of sensor to (delay, sigma), s
         By which a sensor's stamps are late, where that was left open and the data show it.
+    clocks : mapping of sensor to (rate, sigma), s/s
+        By which those delays grow, where the data show it.
     known : mapping of name to (m,) values
         The IMU's scale factors and misalignments (:mod:`truenorth.errors.axes`), and an antenna's arm of which nothing was said,
         where they were estimated. A push on an accelerometer that is askew looks like a tilt, and an arm hides a place: both are
@@ -86,6 +88,7 @@ class Moving:
     vehicle_heading_sigma: float
     track: Track
     delays: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    clocks: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=standing)
 
@@ -146,6 +149,7 @@ class Moving:
             "vehicle_heading_deg": math.degrees(self.vehicle_heading),
             "vehicle_heading_sigma_deg": math.degrees(self.vehicle_heading_sigma),
             "delays_s": {name: list(delay) for name, delay in self.delays.items()},
+            "delays_grow_ppm": {name: [1e6 * rate for rate in rates] for name, rates in self.clocks.items()},
         }
         if self.wheel is not None:
             w = self.wheel

@@ -136,7 +136,7 @@ class Sensors:
 
         unsaid, said = ANTENNA if begin is None else late_as_found(ANTENNA, begin), given(self, "antenna")
         if "latency" in said:  # which is that of all that the receiver says
-            unsaid = replace(unsaid, velocities=None)
+            unsaid = replace(unsaid, velocities=None, drift=None)
         return replace(unsaid, **said)
 
     def wheel(self, found: Mounting | None = None) -> Mounting:

@@ -60,6 +60,12 @@ def dynamics_of(groups: Sequence[Group], noise: Array) -> Dynamics:
             pair[own] = np.arange(at + m, at + 2 * m)
             pair[at + m : at + 2 * m] = RATE
             omega[own], zeta[own], still[own] = group.frequency, group.damping, group.sigma**2
+        elif (
+            group.drift > 0.0
+        ):  # a frequency of nothing, critically damped: value and rate go on as they are, without noise
+            pair[own] = np.arange(at + m, at + 2 * m)
+            pair[at + m : at + 2 * m] = RATE
+            zeta[own] = 1.0
         else:
             decay[own], along[own] = 1.0 / group.correlation_time, 1.0 / group.correlation_distance
             density[own] = 2.0 * group.sigma**2 / group.correlation_time + group.walk**2

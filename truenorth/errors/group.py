@@ -37,7 +37,8 @@ class Group:
     """States of one cause: what is true of it less what is assumed.
 
     Constants, random walks, first-order Gauss-Markov processes in time or along the way, or processes of second order:
-    ``x'' = -2 zeta omega x' - omega^2 x + white noise``, whose rates are states too, behind the values.
+    ``x'' = -2 zeta omega x' - omega^2 x + white noise``, whose rates are states too, behind the values. Or what grows at a steady
+    rate: ``x'' = 0``.
 
     Attributes
     ----------
@@ -55,6 +56,8 @@ class Group:
         Natural frequency of a process of second order; 0: none.
     damping : float
         Its damping ratio: 1 critical, 0 an oscillator.
+    drift : float
+        One sigma of a steady rate, sigma's unit/s, whose states stand behind the values; 0: there is none.
     considered : bool
         It counts in the covariance and is not corrected (Schmidt).
     rotation : bool
@@ -74,6 +77,7 @@ class Group:
     correlation_distance: float = math.inf
     frequency: float = 0.0
     damping: float = 1.0
+    drift: float = 0.0
     considered: bool = False
     rotation: bool = False
     acts: Any = None
@@ -89,6 +93,11 @@ class Group:
                 f"{self.name}: correlation distance {self.correlation_distance:g} m, frequency {self.frequency:g} rad/s, damping "
                 f"{self.damping:g}; expected a positive distance, a frequency of zero or more, a damping from 0 to 1"
             )
+        lasting = bool(np.isinf(self.lasts).all()) and self.frequency == self.walk == 0.0 and not self.rotation
+        if not 0.0 <= self.drift < math.inf or (self.drift > 0.0 and not lasting):
+            raise UsageError(
+                f"{self.name}: drift {self.drift:g}; expected zero or more, and no walk, correlation time or frequency"
+            )
         if self.rotation and len(self.sigma) != 3:
             raise UsageError(f"{self.name}: {len(self.sigma)} states; expected three of a rotation")
         if len(self.figures) > FIGURES:
@@ -96,7 +105,9 @@ class Group:
 
     @property
     def prior(self) -> Array:
-        """(m,) one-sigma of all its states at the start, rates of a second-order process included."""
+        """(m,) one-sigma of all its states at the start, rates included."""
+        if self.drift > 0.0:
+            return np.concatenate([self.sigma, np.full_like(self.sigma, self.drift)])
         return self.sigma if self.frequency == 0.0 else np.concatenate([self.sigma, self.frequency * self.sigma])
 
     @property

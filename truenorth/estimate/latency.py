@@ -7,19 +7,24 @@ pass ends with the delay that it has found, and the next one begins with it.
 At a steady speed ``v`` an arm forward and a delay are one: only ``l - v tau`` is seen. How it is parted, their priors say. Arms of
 which nobody spoke have many sizes, delays have few: where an arm is found beyond its prior, that was too narrow, and the delay has
 taken what it could not hold. The next pass then has a wider arm, and the delay as it was.
+
+The clocks of a receiver and an IMU run at two rates: of quartz, 10 to 100 ppm apart, .04 to .4 s in an hour. So the delay of a
+receiver has a rate, which is a state too, and a pass begins with the rate that the one before has found. A rate that is found
+beyond its prior is that of a poorer clock, and the next pass has a wider prior, as of an arm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.quality.swing import VELOCITIES
-from truenorth.state.evidence import Evidence, note
+from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.limits import is_estimated
 from truenorth.state.mounting import LONGEST_ARM, Mounting
 from truenorth.state.track import Track
@@ -27,7 +32,11 @@ from truenorth.state.track import Track
 Array = NDArray[np.float64]
 
 LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
-LONG_ARM = 2.0  # sigmas of its prior, from which an arm that nobody has said shows a larger vehicle
+LONG_ARM = (
+    2.0  # sigmas of its prior, from which an arm that nobody has said shows a larger vehicle, a rate a poorer clock
+)
+WIDER = 10.0  # times the prior of such a rate: quartz, ceramic resonators, oscillators of a chip without either
+WORST_CLOCK = 1e-2
 SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word, or a pass
 SAID_DELAY = 0.02  # s, from which it is worth a word
 
@@ -41,8 +50,29 @@ def delay_of(track: Track, name: str) -> tuple[float, float, float] | None:
     return float(track.sensors[-1, where.start]), float(track.sigma[-1, where.start]), prior
 
 
+def rate_of(track: Track, name: str) -> tuple[float, float, float] | None:
+    """By how much a sensor's delay grows beyond the assumed rate, its sigma, and its prior, s/s."""
+    where = track.layout.slice_of(f"{name} lag")
+    if where is None or where.stop - where.start < 2:
+        return None
+    prior = dict(zip(track.layout.names, track.layout.priors, strict=True))[f"{name} lag"][1]
+    return float(track.sensors[-1, where.stop - 1]), float(track.sigma[-1, where.stop - 1]), prior
+
+
+def best_rate(track: Track) -> tuple[float, float, float] | None:
+    """What a track has found of how a receiver's clock runs, by its places or its velocities, whichever show it better."""
+    found = [rate for name in ("GNSS", VELOCITIES) if (rate := rate_of(track, name)) is not None]
+    return min(found, key=lambda rate: rate[1], default=None)
+
+
 def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
     """The mounting of a sensor with the delay that a track has found; the same object where that is too short to matter."""
+    rate = best_rate(track) if name == "GNSS" else None
+    if rate is not None and abs(rate[0]) > LONG_ARM * rate[2] and rate[2] < WORST_CLOCK:
+        return replace(mounting, drift=mounting.clock._replace(rate_sigma=min(WIDER * rate[2], WORST_CLOCK)))
+    grown = 0.0 if rate is None else rate[0] * float(track.time[-1] - track.time[0])
+    if rate is not None and abs(grown) > LEAST_DELAY and abs(rate[0]) > SHOWN_DELAY * rate[1]:
+        return as_it_runs(mounting, track)
     later = _more(track, name)
     if later != 0.0:
         mounting = replace(mounting, latency=mounting.latency + later)
@@ -50,6 +80,19 @@ def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
         own = mounting.velocities
         mounting = replace(mounting, velocities=own._replace(latency=own.latency + later))
     return mounting
+
+
+def as_it_runs(mounting: Mounting, track: Track) -> Mounting:
+    """The mounting of a receiver as late as a track has found it, and its delay growing so: that at the track's end is as found."""
+    rate = 0.0 if (found_rate := best_rate(track)) is None else found_rate[0]
+    end, drift = float(track.time[-1]), mounting.clock
+    grown = mounting.late_at(end) - mounting.latency
+    found = {name: 0.0 if (late := delay_of(track, name)) is None else late[0] for name in ("GNSS", VELOCITIES)}
+    own = mounting.velocities
+    if own is not None:
+        own = own._replace(latency=own.latency + grown + found[VELOCITIES])
+    drift = drift._replace(rate=drift.rate + rate, since=end)
+    return replace(mounting, latency=mounting.latency + grown + found["GNSS"], velocities=own, drift=drift)
 
 
 def _more(track: Track, name: str) -> float:
@@ -75,10 +118,11 @@ def mounting_found(mounting: Mounting, track: Track, name: str) -> Mounting:
     return longer if longer is not mounting else as_late_as_found(mounting, track, name)
 
 
-def latencies(name: str, mounting: Mounting) -> dict[str, float]:
-    """How late a sensor is said to be, s, by the names of its delays; a receiver's velocities may have their own."""
-    said = {name: mounting.latency}
-    return said | {VELOCITIES: mounting.of_velocities.latency} if name == "GNSS" else said
+def latencies(name: str, mounting: Mounting, time: Any) -> dict[str, Any]:
+    """How late a sensor is said to be at a time, s, by the names of its delays; a receiver's velocities may have their own."""
+    late = mounting.late_at(time)
+    said = {name: late}
+    return said | {VELOCITIES: late + mounting.of_velocities.latency - mounting.latency} if name == "GNSS" else said
 
 
 def delays_found(track: Track, sensors: Mapping[str, Mounting]) -> dict[str, tuple[float, float]]:
@@ -86,9 +130,29 @@ def delays_found(track: Track, sensors: Mapping[str, Mounting]) -> dict[str, tup
     return {
         delay: (late + found[0], found[1])
         for name, mounting in sensors.items()
-        for delay, late in latencies(name, mounting).items()
+        for delay, late in latencies(name, mounting, float(track.time[-1])).items()
         if (found := delay_of(track, delay)) is not None and is_estimated(found[1], found[2])
     }
+
+
+def rates_found(track: Track, antenna: Mounting) -> dict[str, tuple[float, float]]:
+    """By how much a receiver's delays grow (s/s) and sigmas, by name, where the data show it."""
+    return {
+        delay: (antenna.clock.rate + found[0], found[1])
+        for delay in ("GNSS", VELOCITIES)
+        if (found := rate_of(track, delay)) is not None and is_estimated(found[1], found[2])
+    }
+
+
+def rate_evidence(rates: Mapping[str, tuple[float, float]], track: Track) -> list[Evidence]:
+    """That a receiver's clock and the IMU's run apart: delays are in sigma, velocities are metres in a second of the IMU's."""
+    best = min(rates.values(), key=lambda rate: rate[1], default=(0.0, 0.0))
+    if abs(best[0]) <= SHOWN_DELAY * best[1]:
+        return []
+    key = "clock.runs_fast" if best[0] < 0.0 else "clock.runs_slow"
+    dv = abs(best[0]) * float(np.linalg.norm(track.v_n, axis=1).max())
+    figures: dict[str, Figure] = {"name": "GNSS", "size": 1e6 * abs(best[0]), "sigma": 1e6 * best[1]}
+    return [Evidence(key, figures, kind="hint", effect=Effect(velocity=dv))]
 
 
 def delay_notes(delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:
@@ -100,22 +164,39 @@ def delay_notes(delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:
     ]
 
 
-def counted_from(track: Track, name: str, before: float) -> Track:
-    """The track with a sensor's delay counted from another latency, `before` (s) less than the one it was run with."""
-    return _added(track, f"{name} lag", np.array([before]))
+def counted_from(track: Track, name: str, before: Any, rate: float = 0.0) -> Track:
+    """The track with a sensor's delay counted from another latency, `before` (s) less than the one it was run with.
+
+    Parameters
+    ----------
+    before : float or (K,) array, s
+    rate : float, s/s
+        By which that one grows.
+    """
+    late = np.broadcast_to(np.asarray(before, dtype=np.float64), track.time.shape)
+    return _added(track, f"{name} lag", np.stack([late, np.full_like(late, rate)], axis=1))
+
+
+def counted_between(track: Track, name: str, mounting: Mounting, before: Mounting) -> Track:
+    """The track with a sensor's delays counted from those of another mounting than that it was run with."""
+    said = latencies(name, before, track.time)
+    for delay, late in latencies(name, mounting, track.time).items():
+        track = counted_from(track, delay, late - said[delay], mounting.clock.rate - before.clock.rate)
+    return track
 
 
 def counted_whole(track: Track, name: str, mounting: Mounting) -> Track:
     """The track with a sensor's delays and lever arm as they are, not as what they are beyond those that were said."""
-    for delay, late in latencies(name, mounting).items():
-        track = counted_from(track, delay, late)
+    for delay, late in latencies(name, mounting, track.time).items():
+        track = counted_from(track, delay, late, mounting.clock.rate)
     return _added(track, f"{name} lever arm", mounting.lever_arm)
 
 
 def _added(track: Track, group: str, known: Array) -> Track:
+    """The track with what is known (.., m) of a group's states on top of them; of as many as it has."""
     where = track.layout.slice_of(group)
     if where is None or not known.any():
         return track
     sensors = track.sensors.copy()
-    sensors[:, where] += known
+    sensors[:, where] += known[..., : where.stop - where.start]
     return replace(track, sensors=sensors)

@@ -44,7 +44,8 @@ def late_as_found(antenna: Mounting, begin: Start) -> Mounting:
     if begin.gnss_delay is None:
         return antenna
     late, sigma = begin.gnss_delay
-    return replace(antenna, latency=late, latency_sigma=sigma, velocities=begin.gnss_velocity_delay)
+    own, drift = begin.gnss_velocity_delay, begin.gnss_drift
+    return replace(antenna, latency=late, latency_sigma=sigma, velocities=own, drift=drift)
 
 
 def arm_as_begun(begin: Start, antenna: Mounting | None) -> Start:
@@ -77,7 +78,7 @@ def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
 def _says_the_same(key: str, given: Mounting, found: Mounting) -> bool:
     """Whether a mounting has what an alignment has found, whatever else is said of it."""
     if key == Gnss.key:
-        own, other = ((m.latency, m.latency_sigma, m.velocities) for m in (given, found))
+        own, other = ((m.latency, m.latency_sigma, m.velocities, m.drift) for m in (given, found))
         return own == other
     return given.scale_sigma == found.scale_sigma and bool(np.all(given.C_mb == found.C_mb))
 

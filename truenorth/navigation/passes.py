@@ -13,7 +13,7 @@ from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError
 from truenorth.errors.model import InsModel
-from truenorth.estimate.latency import counted_from, delay_notes, delays_found, latencies
+from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
@@ -104,12 +104,12 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES))
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
+        if receiver.mounting is not None:
+            said += rate_evidence(rates_found(track, receiver.mounting), track)
     for key, (name, _) in SENSORS.items():
         if given.get(key) is asked.get(key):
             continue
-        before = latencies(name, asked[key].mounting)
-        for delay, late in latencies(name, given[key].mounting).items():
-            track = counted_from(track, delay, late - before[delay])
+        track = counted_between(track, name, given[key].mounting, asked[key].mounting)
     return plan, given, track, said
 
 

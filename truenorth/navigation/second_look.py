@@ -120,8 +120,10 @@ def _beyond(track: Track, name: str, role: Role) -> bool:
 
 
 def on_any_clock(mounting: Mounting) -> Mounting:
-    """The same sensor, its clock left open where it was taken for known."""
-    return mounting if mounting.latency_sigma > 0.0 else replace(mounting, latency_sigma=OPEN["lag"].prior)
+    """The same sensor, its clock left open where it was taken for known, as late all the time."""
+    if mounting.latency_sigma > 0.0:
+        return mounting
+    return replace(mounting, latency_sigma=OPEN["lag"].prior, drift=mounting.clock)
 
 
 def as_found(given: dict[str, Any], track: Track) -> dict[str, Any]:
@@ -141,7 +143,7 @@ def _loosened(name: str, mounting: Mounting) -> Mounting:
     open_: dict[str, Any] = {
         OPEN[role].sigma: getattr(mounting, OPEN[role].sigma) or OPEN[role].prior for role in SENSORS[name][1]
     }
-    return replace(mounting, gate=0.0, **open_)
+    return replace(mounting, gate=0.0, drift=mounting.clock, **open_)
 
 
 def _contradiction(role: Role, name: str, key: str, given: Mounting, value: Array, sigma: Array) -> Evidence:

@@ -23,7 +23,7 @@ from truenorth.navigation.handover import Handover
 from truenorth.quality.swing import VELOCITIES
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI, STATES
-from truenorth.state.mounting import Clock, Mounting
+from truenorth.state.mounting import Clock, Drift, Mounting
 from truenorth.state.prior import WholeBiases, positive, prior_covariance
 from truenorth.state.state import Start, State
 
@@ -211,7 +211,15 @@ def _with_sensors(start: Start, summary: Mapping[str, Any]) -> Start:
         wheel=_found_wheel(summary),
         gnss_delay=_found_delay(summary, "GNSS"),
         gnss_velocity_delay=None if own is None else Clock(*own),
+        gnss_drift=_found_drift(summary, start.time),
     )
+
+
+def _found_drift(summary: Mapping[str, Any], time: float) -> Drift | None:
+    """How an alignment on the move, at a time, has found the receiver's clock to run; None: as quartz clocks do."""
+    rates = summary.get("delays_grow_ppm", {}).values()
+    best = min(((1e-6 * float(rate), 1e-6 * float(sigma)) for rate, sigma in rates), key=lambda r: r[1], default=None)
+    return None if best is None else Drift(*best, time)
 
 
 def _found_delay(summary: Mapping[str, Any], sensor: str) -> tuple[float, float] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ STANDING_PULSES = 1.5  # pulses of an odometer in a second: no more is standing
 LEAST_ANGLE = 1e-9  # rad: of a simulated IMU that nothing shakes
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
 LONG_ENOUGH = 30.0  # s: of fewer epochs a filter does not separate a base's motion from its rate
+CALM = 5.0  # times the acceleration of nearly all seconds at rest: a vehicle that moves pushes more
+DIFFERS = 6.0  # times the usual difference of rates of two seconds at rest, from which a rate is another
+MOST_VOTES = 300  # seconds that say what the usual rate is
 APART = 1.5  # s: seconds further apart are two rests
 SPREAD = 0.25  # s before and after the middle of a second at rest, between which its row is drawn
 
@@ -63,6 +67,29 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     return middle[still], middle[before & (motion.kind == DISTURBED)]
 
 
+def turned_in_stops(
+    record: ImuRecord, *logs: OdometerRecord | GnssRecord | VelocityRecord | None
+) -> tuple[Array, Array]:
+    """Middles of seconds (m,) that would be rest but for their rate; by how much that is not the usual one of rest (m, 3), rad/s.
+
+    Sensors of speed see the vehicle stand, and it pushes no more than at rest. Either it turns on the spot, or the biases of its
+    gyros are not those of the other stops.
+    """
+    motion = motion_summary(record)
+    rest = motion.kind == STILL
+    if rest.sum() < 2:
+        return np.empty(0), np.empty((0, 3))
+    calm = motion.acceleration <= CALM * float(np.quantile(motion.acceleration[rest], 0.95))
+    apart = float(np.median(np.linalg.norm(np.diff(motion.rate[rest], axis=0), axis=1)))  # from second to second
+    near = max(BIAS_CHANGE, DIFFERS * apart)
+    some = motion.rate[rest][:: max(1, int(rest.sum()) // MOST_VOTES)]
+    close = np.linalg.norm(some[:, None] - some, axis=2) < 0.5 * near
+    at, off = motion.time - 0.5, motion.rate - np.median(some[close[np.argmax(close.sum(axis=1))]], axis=0)
+    another = calm & (np.linalg.norm(off, axis=1) > near)
+    another &= _standing(at, [_speed_of(log) for log in logs if log is not None])
+    return at[another], off[another]
+
+
 def seconds_at_rest(
     record: ImuRecord,
     odometer: OdometerRecord | VelocityRecord | None = None,
@@ -78,12 +105,15 @@ def seconds_at_rest(
     speeds = [_speed_of(log) for log in (odometer, gnss, velocity) if log is not None]
     if not speeds:
         return seconds
-    agreed = []
-    for at in seconds:
-        looked = sum(_near(at, time) for time, _ in speeds)
-        moved = sum(_near(at, time[moves]) for time, moves in speeds)
-        agreed.append(at[(looked > 0) & (moved == 0)])
+    agreed = [at[_standing(at, speeds)] for at in seconds]
     return agreed[0], agreed[1]
+
+
+def _standing(at: Array, speeds: Sequence[tuple[Array, Any]]) -> NDArray[np.bool_]:
+    """Around which of these times a sensor of speed has looked, and none has seen one."""
+    looked = sum((_near(at, time) for time, _ in speeds), np.zeros(len(at), dtype=np.intp))
+    moved = sum((_near(at, time[moves]) for time, moves in speeds), np.zeros(len(at), dtype=np.intp))
+    return np.asarray((looked > 0) & (moved == 0))
 
 
 def longest_rest(*seconds: Array) -> Array:

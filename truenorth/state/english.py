@@ -148,6 +148,18 @@ SENTENCES = {
     "noise.estimated": "{name}: its noise is {factor:.2g} times as large as was said; so it is taken",
     "delay.late": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s late, which is estimated and in sigma",
     "delay.early": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s early, which is estimated and in sigma",
+    "rest.shifts": (
+        "at {time:.0f} s it stands, and its gyros show {size:deg|.2g} deg/s more than at other stops: biases that change, or a "
+        "turn on the spot; such a change turns heading by up to {heading:deg|.2g} deg until the end"
+    ),
+    "clock.runs_fast": (
+        "the IMU's clock runs fast against that of the {name} by {size:.0f} ± {sigma:.2g} ppm: delays change so, "
+        "which is estimated and in sigma"
+    ),
+    "clock.runs_slow": (
+        "the IMU's clock runs slow against that of the {name} by {size:.0f} ± {sigma:.2g} ppm: delays change so, "
+        "which is estimated and in sigma"
+    ),
     "gnss.delay_taken_over": "GNSS: its stamps are late as the alignment found, and that is estimated on",
     "odometer.taken_over": "odometer: scale, mounting and wheel arm are the alignment's, and estimated on",
     "odometer.scale": "the {name} counts {scale:%|+.2f} % ({sigma:%|.2g} % one sigma)",

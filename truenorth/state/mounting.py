@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,10 @@ Array = NDArray[np.float64]
 
 SLIP_SIGMA = 0.1  # m/s, of a wheel sideways and of a body on its springs up and down
 COMPLIANCE_SIGMA = 5e-3  # rad s^2/m, 2.8 deg/g: tyres give 1 to 5 deg/g, springs 2 to 4
+# Of a quartz clock without compensation of its temperature, s/s: 10 to 100 ppm, and of hobby boards and phones up to 500 ppm, which
+# is within 3.3 of these sigmas. Source: J. R. Vig, "Quartz Crystal Resonators and Oscillators for Frequency Control and Timing
+# Applications" (tutorial), hierarchy of oscillators; for the boards our own choice.
+QUARTZ = 1.5e-4
 LONGEST_ARM = 100.0  # m; ships have no longer ones
 
 
@@ -25,6 +29,17 @@ class Clock(NamedTuple):
 
     latency: float  # s, by which it is older than its time stamp
     latency_sigma: float  # s; 0: known, else it is estimated
+
+
+class Drift(NamedTuple):
+    """A clock that runs at another rate than the IMU's."""
+
+    rate: float  # by how much the latency grows, s/s
+    rate_sigma: float  # 0: known, else it is estimated
+    since: float  # s, when the latency is that of the mounting
+
+
+ONE_CLOCK = Drift(0.0, 0.0, 0.0)  # a receiver's and an IMU's stamps are of one
 
 
 @dataclass(frozen=True)
@@ -52,6 +67,9 @@ class Mounting:
         The measurement is older than its time stamp by this much.
     latency_sigma : float, s
         0: known; else the latency is estimated.
+    drift : Drift, optional
+        Of a receiver's clock against the IMU's: the latency grows at a steady rate. Left out, it does as quartz clocks do
+        (:data:`QUARTZ`) where the latency is estimated, and does not where it is known.
     velocities : Clock, optional
         How late a receiver's velocities are, where that is not how late its places are: a mean over an interval is half of it older
         than a place of the same stamp.
@@ -75,6 +93,7 @@ class Mounting:
     bias_time: float = math.inf
     latency: float = 0.0
     latency_sigma: float = 0.0
+    drift: Drift | None = None
     velocities: Clock | None = None
     gate: float = limit("gate")
     noise: float | None = None
@@ -85,6 +104,21 @@ class Mounting:
     def of_velocities(self) -> Clock:
         """How late a receiver's velocities are: as its places, where nothing else is said."""
         return self.velocities or Clock(self.latency, self.latency_sigma)
+
+    @property
+    def clock(self) -> Drift:
+        """How a receiver's clock runs against the IMU's: as quartz clocks do, where nothing else is said."""
+        return self.drift or Drift(0.0, QUARTZ if self.latency_sigma > 0.0 else 0.0, 0.0)
+
+    def late_at(self, time: Any) -> Any:
+        """Latency at a time or at times, s."""
+        rate, _, since = self.clock
+        return self.latency + rate * (time - since)
+
+    def stamped(self, time: Any) -> Any:
+        """The stamp of what holds at a time, s: that of :meth:`late_at` is of the stamp."""
+        rate, _, since = self.clock
+        return time + (self.latency + rate * (time - since)) / (1.0 - rate) if rate else time + self.latency
 
     @property
     def slow(self) -> float:
@@ -101,6 +135,14 @@ class Mounting:
                 "centimetres or millimetres handed in?"
             )
         object.__setattr__(self, "lever_arm", arm)
+        if self.drift is not None:
+            try:
+                drift = Drift(*map(float, self.drift))
+            except (TypeError, ValueError):
+                drift = Drift(math.nan, math.nan, math.nan)
+            if not (abs(drift.rate) < 1.0 and 0.0 <= drift.rate_sigma < math.inf and math.isfinite(drift.since)):
+                raise UsageError(f"drift={self.drift!r}; expected a rate and its sigma, s/s, and a time, s")
+            object.__setattr__(self, "drift", drift)
         if self.velocities is not None:
             try:
                 clock = Clock(*map(float, self.velocities))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.state.layout import STATES
-from truenorth.state.mounting import Clock, Mounting
+from truenorth.state.mounting import Clock, Drift, Mounting
 from truenorth.state.prior import WholeBiases
 
 Array = NDArray[np.float64]
@@ -61,6 +61,8 @@ class Start(State):
         By which that alignment found the receiver's stamps to be late.
     gnss_velocity_delay : Clock or None
         By which it found those of the receiver's velocities to be late, where they have a delay of their own.
+    gnss_drift : Drift or None
+        How it found the receiver's clock to run against the IMU's.
     plumb : float, rad
         One-sigma deflection of the vertical that P holds as tilt and accelerometer bias that cancel each other; 0: none.
     known : mapping of name to (m,) values
@@ -75,6 +77,7 @@ class Start(State):
     wheel: Mounting | None = None
     gnss_delay: tuple[float, float] | None = None
     gnss_velocity_delay: Clock | None = None
+    gnss_drift: Drift | None = None
     plumb: float = 0.0
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=lambda: np.zeros(3))
