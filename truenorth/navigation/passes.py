@@ -101,7 +101,8 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
             said += more
             track = plan.run(plan.sources(given), smooth=smooth)
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
-        track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES))
+        fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
+        track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES), fixes)
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
     for key, (name, _) in SENSORS.items():
