@@ -44,9 +44,7 @@ def drawn_start(motion: Moving, spec: ImuSpec, rng: np.random.Generator) -> Star
     return Start(0.0, C, at.v_n[0] + x0[DV], lat, lon, at.alt[0] + x0[DP][2], zero, zero, np.diag(sigma**2))
 
 
-def received(
-    motion: Moving, duration: float, every: float, rng: np.random.Generator, place: float = PLACE
-) -> Gnss:
+def received(motion: Moving, duration: float, every: float, rng: np.random.Generator, place: float = PLACE) -> Gnss:
     """Fixes of an antenna on its arm, with white noise of `place` (m), and velocities."""
     time = np.arange(0.4, duration, every)
     fix = motion.states(time)

@@ -37,7 +37,6 @@ def receiver(fixes: Gnss, rng: np.random.Generator, share: float, time: float, e
         lasts = gauss_markov(slow, time, every, count, rng)
     else:
         lasts = np.tile(slow * rng.standard_normal(3), (count, 1))
-    # Those of `received` are white, 1 m: the rest is put on top of a part of them.
     R_M, R_N = radii(record.lat[0])
     metres = np.array([R_M, R_N * np.cos(record.lat[0]), 1.0])
     off = (lasts + white * rng.standard_normal((count, 3)))[:, [1, 0, 2]] / metres
@@ -46,7 +45,9 @@ def receiver(fixes: Gnss, rng: np.random.Generator, share: float, time: float, e
     return Gnss(shifted, Mounting(lever_arm=ARM))
 
 
-def driven(name: str, grade: str, duration: float, share: float, time: float, every: float = 1.0, **options: Any) -> Any:
+def driven(
+    name: str, grade: str, duration: float, share: float, time: float, every: float = 1.0, **options: Any
+) -> Any:
     """A run: the vehicle's drawn course, an IMU of a grade, a drawn start, fixes of such errors."""
     spec = imu_spec(grade)
 
@@ -75,9 +76,9 @@ CASES = tuple(
         f"{what}, {grade} IMU, {name}, {duration:g} s",
         driven(name, grade, duration, *of, check_clocks=False),
     )
-    for name in VEHICLES
+    for name, durations in (("car", (200.0, 600.0)), ("ship", (200.0, 600.0, 1800.0)))
     for grade in ("industrial", "tactical")
-    for duration in (200.0, 600.0, 1800.0)
+    for duration in durations
     for what, of in ERRORS.items()
 )
 

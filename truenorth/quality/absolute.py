@@ -27,6 +27,7 @@ from truenorth.aiding.sensors import place_axes, place_sigma
 from truenorth.aiding.source import Aiding
 from truenorth.quality.aid_noise import white_part
 from truenorth.quality.slow_aids import FIXES, Lasting, as_lasting, says_size, slow_errors, usual_bias, with_slow
+from truenorth.quality.swing import UNSEEN_ARM
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import ANTENNA_ARM, DP
@@ -63,8 +64,8 @@ def known_as_fixes(
 
     Of heights, too, where the receiver has them. What the receiver says of a fix is noise, what wanders and what stays,
     together. Innovations have shown the noise and what wanders (`shown`), or that nothing does and how large the noise of `fixes`
-    is; both are in the track's covariance: only the rest can stay. A receiver that says far less than innovations show, or nothing, says nothing of the rest: there position is known no
-    better than its slow error, which may last longer than the log.
+    is; both are in the track's covariance: only the rest can stay. A receiver that says far less than innovations show, or nothing,
+    says nothing of the rest: there position is known no better than its slow error, which may last longer than the log.
     """
     if bias is not None or record is None or not record.has_position.any() or not len(track.P):
         return track
@@ -88,7 +89,9 @@ def _left(track: Track, record: GnssRecord, shown: Lasting | None, fixes: Aiding
     if shown is not None:
         seen = math.hypot(shown.white, shown.group.sigma[0] / place_sigma(record))
         return np.full(3, max(1.0 - seen**2, 0.0)) if says_size(record) and seen < limit("fix untrue") else None
-    if fixes is None or record.position_sigma is None:  # a dilution of precision says nothing of the size of a range's error
+    if (
+        fixes is None or record.position_sigma is None
+    ):  # a dilution of precision says nothing of the size of a range's error
         return None
     level, up = (white_part(track, fixes, axes) for axes in (LEVEL, UP))
     if level is None or not level[0] < limit("fix untrue") ** 2:
@@ -145,6 +148,22 @@ def _with_arm_of(track: Track, start: Start) -> Track:
     if ANTENNA_ARM in start.known:
         begun = np.diag(start.P)[start.states_of(ANTENNA_ARM)]
     now = np.diagonal(track.P, axis1=1, axis2=2)[:, own]
+    return _wider(track, np.maximum(begun - now, 0.0))
+
+
+def with_open_arm(track: Track) -> Track:
+    """The track with the place as uncertain as is the part of an estimated arm whose swing the receiver does not show.
+
+    Of a swing whose phase no state knows what is learnt of the arm upward is made of how the receiver filters.
+    """
+    unseen = track.layout.slice_of(UNSEEN_ARM)
+    if unseen is None or track.layout.slice_of(ANTENNA_ARM) is None or not len(track.P):
+        return track
+    return _wider(track, np.tile(track.sensors[-1, unseen] ** 2, (len(track), 1)))
+
+
+def _wider(track: Track, variance: Array) -> Track:
+    """The track with these variances (K, 3), m^2, of a body axis each, in those of the place, but of a height that is held."""
     P, C = track.P.copy(), track.C_nb * (np.diagonal(track.P, axis1=1, axis2=2)[:, DP] > 0.0)[:, :, None]
-    P[:, DP, DP] += (C * np.maximum(begun - now, 0.0)[:, None, :]) @ np.swapaxes(C, 1, 2)
+    P[:, DP, DP] += (C * variance[:, None, :]) @ np.swapaxes(C, 1, 2)
     return replace(track, P=P)

@@ -34,6 +34,7 @@ QUANTILES = {0.5: 0.4549, 0.8: 1.6424}
 WHEEL, WHEELS = "odometer", {0.95: 3.8415}
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
 STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
+LEAST_SQUARE = 0.05  # in parts of the variance: of differences that are expected to be nothing the scatter is no less
 LOUD = 3.0  # times its sigma, that an aid is so noisy that what a first pass found is made of noise
 
 
@@ -142,7 +143,9 @@ def white_part(track: Track, source: Aiding, axes: slice) -> tuple[float, float]
     there = np.isfinite(squares) & np.isfinite(share)
     if int(there.sum()) < FEWEST or not (weight := float(np.sum(share[there] ** 2))) > 0.0:
         return None
-    return 1.0 + float(np.sum((squares * share)[there])) / weight, math.sqrt(3.0 / weight)
+    part = 1.0 + float(np.sum((squares * share)[there])) / weight
+    expected = np.maximum(1.0 + (part - 1.0) * share[there], LEAST_SQUARE)
+    return part, math.sqrt(3.0 * float(np.sum((share[there] * expected) ** 2))) / weight
 
 
 def louder(aiding: Sequence[Aiding], factors: Mapping[str, Array]) -> list[Aiding]:
