@@ -9,7 +9,7 @@ part is in the differences of innovations, a share ``q`` of ``s^2`` to within it
 (:func:`truenorth.quality.aid_noise.white_part`). What is left is shared, ``c = 1 - q``, and no more: with all shares from 0 to 1
 alike likely beforehand, c is normal about ``1 - q`` with the sigma u, cut off at 0 and 1, and its mean times ``s^2`` is in the
 variance of position. Of white fixes ``c`` is ``.8 u`` in the mean, some ``sqrt(2/N)`` of N fixes: a hundred of them still leave a
-third of what one of them is off by, a thousand a fifth. Fixes that share less than that cannot be told from white ones.
+third of what one of them is off by, a thousand a fifth. Fixes that share less than that cannot be separated from white ones.
 
 The rule is ours; the estimate of noise is R. Mehra's, see there.
 """
