@@ -44,14 +44,14 @@ def drawn_start(motion: Moving, spec: ImuSpec, rng: np.random.Generator) -> Star
     return Start(0.0, C, at.v_n[0] + x0[DV], lat, lon, at.alt[0] + x0[DP][2], zero, zero, np.diag(sigma**2))
 
 
-def received(motion: Moving, duration: float, every: float, rng: np.random.Generator) -> Gnss:
-    """Fixes of an antenna on its arm, with velocities."""
+def received(motion: Moving, duration: float, every: float, rng: np.random.Generator, place: float = PLACE) -> Gnss:
+    """Fixes of an antenna on its arm, with white noise of `place` (m), and velocities."""
     time = np.arange(0.4, duration, every)
     fix = motion.states(time)
     R_M, R_N = radii(fix.lat[0])
     antenna = fix.v_n + np.einsum("kij,kj->ki", fix.C_nb, np.cross(fix.w_ib_b, ARM))
     arm = np.einsum("kij,j->ki", fix.C_nb, ARM)
-    noise = rng.standard_normal((2, len(time), 3)) * np.array([PLACE, SPEED])[:, None, None]
+    noise = rng.standard_normal((2, len(time), 3)) * np.array([place, SPEED])[:, None, None]
     off = arm + noise[0]
     record = GnssRecord(
         time,

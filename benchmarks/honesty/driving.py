@@ -36,12 +36,12 @@ def _tone(rng: np.random.Generator, amplitude: float, period: float) -> tuple[To
     return (Tone(amplitude * DEG * rng.uniform(0.5, 1.0), period * rng.uniform(0.8, 1.2), rng.uniform(0.0, 6.28)),)
 
 
-def car(rng: np.random.Generator) -> Moving:
+def car(rng: np.random.Generator, duration: float = CAR) -> Moving:
     """Off from a stop, turns of 30 to 120 deg at 6 to 12 deg/s, faster and slower, up and down slopes; its body rolls a little."""
     place = Position.from_degrees(rng.uniform(-60.0, 60.0), rng.uniform(-180.0, 180.0), 100.0)
     speed = 0.0
     legs = [*straight(rng.uniform(5.0, 20.0))]
-    while length(legs) < CAR:
+    while length(legs) < duration:
         faster = rng.uniform(5.0, 18.0)
         angle, rate = rng.choice([-1.0, 1.0]) * rng.uniform(30.0, 120.0), rng.uniform(6.0, 12.0)
         legs += accelerate(faster, rng.uniform(1.0, 2.0), before=speed, onset=1.0)
@@ -52,11 +52,11 @@ def car(rng: np.random.Generator) -> Moving:
     return Disturbed(way, roll_tones=_tone(rng, 0.3, 2.0), pitch_tones=_tone(rng, 0.3, 1.5))
 
 
-def ship(rng: np.random.Generator) -> Moving:
+def ship(rng: np.random.Generator, duration: float = SHIP) -> Moving:
     """4 to 10 m/s in a swell, a turn of 40 to 150 deg at 1 to 2 deg/s now and then."""
     place = Position.from_degrees(rng.uniform(-60.0, 60.0), rng.uniform(-180.0, 180.0))
     legs = [*straight(rng.uniform(10.0, 60.0))]
-    while length(legs) < SHIP:
+    while length(legs) < duration:
         angle = rng.choice([-1.0, 1.0]) * rng.uniform(40.0, 150.0)
         legs += turn(angle * DEG, rng.uniform(1.0, 2.0) * DEG, onset=5.0) + straight(rng.uniform(30.0, 90.0))
     way = course(place, legs, heading=rng.uniform(0.0, 6.28), speed=rng.uniform(4.0, 10.0))

@@ -21,8 +21,8 @@ ARM = np.array([0.3, -0.2, 2.0])
 NOISE = 0.03  # m/s
 
 
-def driven(grade, seed, late, mean, said=True):
-    """Alignment by a receiver whose fixes are so late, s, its velocities a mean over so many seconds before."""
+def recorded(grade, seed, late, mean, arm=ARM, rate=1.0):
+    """A drive on rough ground; a receiver whose fixes are so late, s, its velocities a mean over so many seconds before."""
     tones = {
         name: [{"amplitude": "0.4 deg", "period": f"{period} s"}] for name, period in (("roll", 0.45), ("pitch", 0.37))
     }
@@ -35,10 +35,10 @@ def driven(grade, seed, late, mean, said=True):
         "motion": {"kind": "legs", "heading": f"{70 * seed} deg", "legs": DRIVE},
         "disturbances": [{"kind": "sway", "tones": tones}],
         "gnss": {
-            "rate": "1 Hz",
+            "rate": f"{rate} Hz",
             "position_noise": "0.5 m",
             "velocity_noise": f"{NOISE} m/s",
-            "lever_arm": [f"{x} m" for x in ARM],
+            "lever_arm": [f"{x} m" for x in arm],
         },
     }
     scenario = read_scenario(mapping)
@@ -47,10 +47,15 @@ def driven(grade, seed, late, mean, said=True):
     if mean > 0.0:
         times = np.maximum(gnss.time[:, None] - np.linspace(0.0, mean, 20), log.record.time[0])
         at = log.motion.states(times.ravel())
-        v = at.v_n + np.einsum("kij,kj->ki", at.C_nb, np.cross(at.w_ib_b, ARM))
+        v = at.v_n + np.einsum("kij,kj->ki", at.C_nb, np.cross(at.w_ib_b, arm))
         noise = NOISE * np.random.default_rng(seed).standard_normal(gnss.v_n.shape)
         gnss = replace(gnss, v_n=v.reshape(*times.shape, 3).mean(axis=1) + noise)
-    gnss = replace(gnss, time=gnss.time + late)
+    return log, replace(gnss, time=gnss.time + late)
+
+
+def driven(grade, seed, late, mean, said=True):
+    """Alignment on such a drive."""
+    log, gnss = recorded(grade, seed, late, mean)
     antenna = Mounting(lever_arm=ARM, latency_sigma=0.2) if said else None
     return align_in_motion(log.record, grade, gnss=gnss, antenna=antenna)
 

@@ -43,13 +43,13 @@ from truenorth.quality.slow_aids import (
     with_slow,
 )
 from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
-from truenorth.quality.swing import UNSEEN_ARM, VELOCITIES, swing, unseen_swing, with_unseen_arm
+from truenorth.quality.swing import VELOCITIES, shown_arm, swing, unseen_swing, with_unseen_arm
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specified import corrected, seen_in
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import ANTENNA_ARM, BA
+from truenorth.state.layout import BA
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -107,7 +107,7 @@ class MovingTask:
         factors = noise_factors(track, aiding, self.factors)
         antenna = mounting_found(self.antenna, track, "GNSS")
         scatter = stamp_scatter(track, aiding, self.scatter)
-        arm = self._arm(track)
+        arm = shown_arm(track, self.antenna.lever_arm)
         given = self.antenna.latency_sigma == 0.0
         unseen = 0.0 if given else unseen_swing(track, self.record, arm, self.unseen)
         scatters = differs(self.scatter, scatter) or differs(self.unseen, unseen)
@@ -122,14 +122,6 @@ class MovingTask:
                 added[VELOCITIES] = np.hypot(added.get(VELOCITIES, 0.0), more)
         learnt = replace(self, factors=factors, antenna=antenna, scatter=scatter, scattered=added)
         return replace(learnt, unseen=unseen, swings=swings), True
-
-    def _arm(self, track: Track) -> Array:
-        """(3,) of the antenna, as a track has found it, m, without the part of it whose swing is found not to be shown."""
-        arm = self.antenna.lever_arm.copy()
-        for name, sign in ((ANTENNA_ARM, 1.0), (UNSEEN_ARM, -1.0)):
-            if (there := track.layout.slice_of(name)) is not None:
-                arm += sign * track.sensors[-1, there]
-        return arm
 
     def with_slow_errors(self, track: Track) -> MovingTask:
         """The task with slow errors of its aids that a pass has shown: the same one where there are none."""

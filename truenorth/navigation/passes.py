@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.in_motion_learnt import differs
 from truenorth.core.errors import DataError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
@@ -20,12 +21,14 @@ from truenorth.estimate.slow_fit import fitted
 from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.second_look import SENSORS, as_found
-from truenorth.quality.absolute import known_as_fixes, says_size
+from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
-from truenorth.quality.swing import with_unseen_arm
+from truenorth.quality.stamps import with_scatter
+from truenorth.quality.swing import shown_arm, swing, unseen_swing, with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
+from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -34,6 +37,8 @@ Array = NDArray[np.float64]
 COARSE = 1.0  # s, between predictions of a filter that looks for the receiver's errors
 PART = 900.0  # s of a log, that show them: some ten times as long as they last
 NOISE_PASSES = 4
+OF_ANY_PHASE = 2.0**0.5  # of a swing: what is predicted and what another phase of it shows count, both
+LEAST_UNSEEN = 0.3  # of a swing that a filter lost a track by
 MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 
 
@@ -50,15 +55,20 @@ class Plan:
     every: int
     slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
     factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
+    swings: bool = (
+        False  # the receiver's velocities do not show all of the swing of its antenna, which sits at a known place
+    )
+    unseen: float = 0.0  # share of that swing which is in their noise
+    scattered: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
 
     def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
         """Measurements of all aids."""
         said = [source for a in given.values() for source in a.sources(self.altitude)]
-        return louder(with_slow(said, self.slow), self.factors)
+        return with_scatter(louder(with_slow(said, self.slow), self.factors), self.scattered)
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
-        used = [*with_unseen_arm(sensors, self.record), *self.always]
+        used = [*with_unseen_arm(sensors, self.record, known=self.swings), *self.always]
         return navigate_track(
             self.record,
             self.start,
@@ -80,13 +90,20 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     said: list[Evidence] = []
     asked = given
     track = plan.run(plan.sources(given), smooth=smooth)
+    plan, track = _with_swing_apart(plan, given, track, smooth)
+    plan, track = _not_lost(plan, given, track, smooth)
     plan, track = _as_noisy(plan, given, track, smooth)
     said += noise_notes(plan.factors)
     later = delayed(plan, given, track)
     if later is not given:
         given = later
         track = plan.run(plan.sources(given), smooth=smooth)
-    given, track = _of_two_moments(plan, given, track, smooth)
+    for _ in range(2):  # what is noise hides a delay
+        given, track = _of_two_moments(plan, given, track, smooth)
+        as_it_was = plan
+        plan, track = _with_unseen_swing(plan, given, track, smooth)
+        if plan is as_it_was:
+            break
     for _ in range(2):  # one sensor's may hide another's
         slow, shown = slow_errors(track, plan.sources(given))
         if not slow:
@@ -101,7 +118,9 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
             said += more
             track = plan.run(plan.sources(given), smooth=smooth)
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
-        track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES))
+        fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
+        track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES), fixes)
+        track = with_open_arm(track) if plan.unseen else track
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
         if receiver.mounting is not None:
@@ -111,6 +130,65 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
             continue
         track = counted_between(track, name, given[key].mounting, asked[key].mounting)
     return plan, given, track, said
+
+
+def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
+    """The plan whose receiver does not show its antenna's swing, where the log speaks for it, and its track; else the same ones.
+
+    First of all: of a swing that is taken for motion the filter makes delays, and loses the track.
+    """
+    apart, aiding = replace(plan, swings=True), plan.sources(given)
+    both = (with_unseen_arm(aiding, plan.record, known=known) for known in (False, True))
+    if all(one.states.keys() == two.states.keys() for one, two in zip(*both, strict=True)):
+        return plan, track
+    try:
+        other = apart.run(aiding, smooth=smooth)
+    except DataError:  # the filter broke down
+        return plan, track
+    return (apart, other) if explained_by_two(other, track) else (plan, track)
+
+
+def _not_lost(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
+    """The plan with all of an antenna's swing as noise, and its track, where that keeps a track that is lost; else the same ones.
+
+    Of a swing that the receiver shows late, or filtered, no state knows the phase, and gates keep out what would show how late it
+    is. How much of it is noise is learnt once delays are found (:func:`_with_unseen_swing`).
+    """
+    receiver = given.get(Gnss.key)
+    lost = max((r.rejected / max(len(r.time), 1) for r in track.residuals), default=0.0) > limit("rejected")
+    if not lost or not isinstance(receiver, Gnss) or not (antenna := receiver.mounting) or antenna.latency_sigma == 0.0:
+        return plan, track
+    other = _with_swing(plan, given, track, np.hypot(antenna.lever_arm, antenna.lever_arm_sigma), OF_ANY_PHASE)
+    try:
+        quiet = other.run(other.sources(given), smooth=smooth)
+    except DataError:  # the filter broke down
+        return plan, track
+    return (other, quiet) if explained_by_two(quiet, track) else (plan, track)
+
+
+def _with_unseen_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
+    """The plan with as much of an antenna's swing as noise as innovations show now, and its track, once any of it is.
+
+    A filter shows less of a swing the quicker it is, and the states have one part for all: that is no evidence of an arm.
+    """
+    receiver = given.get(Gnss.key)
+    if not plan.unseen or not isinstance(receiver, Gnss) or receiver.mounting is None:
+        return plan, track
+    for _ in range(NOISE_PASSES):
+        arm = shown_arm(track, receiver.mounting.lever_arm)
+        share = max(unseen_swing(track, plan.record, arm, plan.unseen), LEAST_UNSEEN)
+        if not differs(plan.unseen, share):
+            break
+        plan = _with_swing(plan, given, track, arm, share)
+        track = plan.run(plan.sources(given), smooth=smooth)
+    return plan, track
+
+
+def _with_swing(plan: Plan, given: dict[str, Any], track: Track, arm: Array, share: float) -> Plan:
+    """The plan with a share of the swing of an antenna on an arm in the noise of its velocities."""
+    fixes = [source for source in plan.sources(given) if source.name == SPEEDS]
+    added = {source.name: share * swing(track, plan.record, arm, source.time) for source in fixes}
+    return replace(plan, unseen=share, scattered=added)
 
 
 def _of_two_moments(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[dict[str, Any], Track]:

@@ -15,6 +15,7 @@ from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.rivals import moved
+from truenorth.quality.swing import UNSEEN_ARM
 from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
@@ -85,6 +86,8 @@ def second_look(
             if where is None or (said > 0.0 and role != "lever arm"):
                 continue
             value, sigma = track.sensors[-1, where], np.hypot(track.sigma[-1, where], said)
+            if role == "lever arm" and key == "gnss":
+                sigma = np.hypot(sigma, _unseen(track))
             size = np.where(np.abs(value) > OPEN[role].least, np.abs(value) / sigma, 0.0)
             if np.any(size > limit("misfit")):
                 item = _contradiction(role, name, key, given, value, sigma)
@@ -99,6 +102,12 @@ def second_look(
     whole = moved(first, track)
     share = Effect(*(size / math.sqrt(len(against)) for _, size in whole.items()))
     return [replace(item, kind="known" if item.urgent else "hint", effect=share) for item in against] + found
+
+
+def _unseen(track: Track) -> Array:
+    """(3,) m: the part of the antenna's arm whose swing its receiver does not show: how it filters nobody knows."""
+    where = track.layout.slice_of(UNSEEN_ARM)
+    return np.zeros(3) if where is None else track.sensors[-1, where]
 
 
 def _contradicted(track: Track) -> float:

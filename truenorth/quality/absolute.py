@@ -3,6 +3,15 @@
 Of fixes with a constant error b the innovations are ``z = dp - b``, and b is in no velocity: the filter ends at ``dp = b``, and an
 hour of fixes is as far off as one of them. Orbits, clocks, atmosphere and a reference station's own place err so for minutes to
 hours. So where nobody says how large slow errors are (``Mounting.bias_sigma`` None), position is known no better than by a fix.
+
+What a receiver says of a fix is the size of all its errors, ``s^2 = s_w^2 + s_c^2``: white noise and what fixes share. The white
+part is in the differences of innovations, a share ``q`` of ``s^2`` to within its own sigma ``u``
+(:func:`truenorth.quality.aid_noise.white_part`). What is left is shared, ``c = 1 - q``, and no more: with all shares from 0 to 1
+alike likely beforehand, c is normal about ``1 - q`` with the sigma u, cut off at 0 and 1, and its mean times ``s^2`` is in the
+variance of position. Of white fixes ``c`` is ``.8 u`` in the mean, some ``sqrt(2/N)`` of N fixes: a hundred of them still leave a
+third of what one of them is off by, a thousand a fifth. Fixes that share less than that cannot be separated from white ones.
+
+The rule is ours; the estimate of noise is R. Mehra's, see there.
 """
 
 from __future__ import annotations
@@ -15,7 +24,10 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Gnss
 from truenorth.aiding.sensors import place_axes, place_sigma
+from truenorth.aiding.source import Aiding
+from truenorth.quality.aid_noise import white_part
 from truenorth.quality.slow_aids import FIXES, Lasting, as_lasting, says_size, slow_errors, usual_bias, with_slow
+from truenorth.quality.swing import UNSEEN_ARM
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import ANTENNA_ARM, DP
@@ -27,6 +39,9 @@ Array = NDArray[np.float64]
 
 # m, along the level, of a receiver that says nothing but the kind of its fixes (NMEA 0183): differential, fixed and floating phase
 BY_QUALITY = {2: 1.0, 4: 0.05, 5: 0.5}
+LEVEL, UP = slice(0, 2), slice(2, 3)
+PARTS = 1001  # of a variance, from 0 to 1, that may be shared
+CHANCE = 2.0  # sigmas, beyond which a receiver has more noise than it says
 
 
 def accuracy_of(record: GnssRecord) -> Array:
@@ -38,13 +53,19 @@ def accuracy_of(record: GnssRecord) -> Array:
     return level * place_axes(record)
 
 
-def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None, shown: Lasting | None = None) -> Track:
+def known_as_fixes(
+    track: Track,
+    record: GnssRecord | None,
+    bias: float | None,
+    shown: Lasting | None = None,
+    fixes: Aiding | None = None,
+) -> Track:
     """The track with position known no better than by a fix of this receiver; `bias`: what was said of its slow error.
 
     Of heights, too, where the receiver has them. What the receiver says of a fix is noise, what wanders and what stays,
-    together. Innovations have shown the noise and what wanders (`shown`), which are in the track's covariance: only the rest can
-    stay. A receiver that says far less than innovations show, or nothing, says nothing of the rest: there position is known no
-    better than its slow error, which may last longer than the log.
+    together. Innovations have shown the noise and what wanders (`shown`), or that nothing does and how large the noise of `fixes`
+    is; both are in the track's covariance: only the rest can stay. A receiver that says far less than innovations show, or nothing,
+    says nothing of the rest: there position is known no better than its slow error, which may last longer than the log.
     """
     if bias is not None or record is None or not record.has_position.any() or not len(track.P):
         return track
@@ -53,14 +74,41 @@ def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None, 
         sigma[2] = 0.0
     P, at = track.P.copy(), np.arange(DP.start, DP.stop)
     known = P[:, at, at] > 0.0  # a height that is held has no sigma
-    seen = math.inf if shown is None else math.hypot(shown.white, shown.group.sigma[0] / place_sigma(record))
-    if says_size(record) and seen < limit("fix untrue"):
-        wide = P[:, at, at] + max(1.0 - seen**2, 0.0) * sigma**2
+    rest = _left(track, record, shown, fixes)
+    if rest is not None:
+        wide = P[:, at, at] + rest * sigma**2
     else:
         least = sigma if shown is None else np.maximum(sigma, shown.group.sigma)
         wide = np.maximum(P[:, at, at], least**2)
     P[:, at, at] = np.where(known, wide, P[:, at, at])
     return replace(track, P=P)
+
+
+def _left(track: Track, record: GnssRecord, shown: Lasting | None, fixes: Aiding | None) -> Array | None:
+    """(3,) which part of the variance that a receiver says is neither noise nor wanders; None: nothing is known of it."""
+    if shown is not None:
+        seen = math.hypot(shown.white, shown.group.sigma[0] / place_sigma(record))
+        return np.full(3, max(1.0 - seen**2, 0.0)) if says_size(record) and seen < limit("fix untrue") else None
+    if (
+        fixes is None or record.position_sigma is None
+    ):  # a dilution of precision says nothing of the size of a range's error
+        return None
+    level, up = (white_part(track, fixes, axes) for axes in (LEVEL, UP))
+    if level is None or not level[0] < limit("fix untrue") ** 2:
+        return None
+    left = shared_part(*level)
+    return np.array([left, left, 1.0 if up is None else shared_part(*up)])
+
+
+def shared_part(white: float, sigma: float) -> float:
+    """Mean of the part of a variance that is not white, from 0 to 1, where the white part is known to a sigma.
+
+    A receiver that has more noise than it says, beyond chance, says too little: by as much again at a time.
+    """
+    parts = np.linspace(0.0, 1.0, PARTS)
+    misfit = np.square((parts - (1.0 - white)) / sigma)
+    weight = np.exp(-0.5 * (misfit - misfit.min()))
+    return min(1.0, float(parts @ weight / weight.sum()) + max(0.0, white - 1.0 - CHANCE * sigma))
 
 
 def known_as_followed(
@@ -86,7 +134,8 @@ def known_as_followed(
     fixes = [source for source in receiver.sources(altitude) if source.name == FIXES]
     slow, said = slow_errors(track, fixes)
     bias = None if receiver.mounting is None else receiver.mounting.bias_sigma
-    found = as_lasting(known_as_fixes(track, receiver.record, bias), with_slow(fixes, slow))
+    known = known_as_fixes(track, receiver.record, bias, fixes=next(iter(fixes), None))
+    found = as_lasting(known, with_slow(fixes, slow))
     return (_with_arm_of(found, start) if said and start is not None else found), said
 
 
@@ -99,6 +148,22 @@ def _with_arm_of(track: Track, start: Start) -> Track:
     if ANTENNA_ARM in start.known:
         begun = np.diag(start.P)[start.states_of(ANTENNA_ARM)]
     now = np.diagonal(track.P, axis1=1, axis2=2)[:, own]
+    return _wider(track, np.maximum(begun - now, 0.0))
+
+
+def with_open_arm(track: Track) -> Track:
+    """The track with the place as uncertain as is the part of an estimated arm whose swing the receiver does not show.
+
+    Of a swing whose phase no state knows what is learnt of the arm upward is made of how the receiver filters.
+    """
+    unseen = track.layout.slice_of(UNSEEN_ARM)
+    if unseen is None or track.layout.slice_of(ANTENNA_ARM) is None or not len(track.P):
+        return track
+    return _wider(track, np.tile(track.sensors[-1, unseen] ** 2, (len(track), 1)))
+
+
+def _wider(track: Track, variance: Array) -> Track:
+    """The track with these variances (K, 3), m^2, of a body axis each, in those of the place, but of a height that is held."""
     P, C = track.P.copy(), track.C_nb * (np.diagonal(track.P, axis1=1, axis2=2)[:, DP] > 0.0)[:, :, None]
-    P[:, DP, DP] += (C * np.maximum(begun - now, 0.0)[:, None, :]) @ np.swapaxes(C, 1, 2)
+    P[:, DP, DP] += (C * variance[:, None, :]) @ np.swapaxes(C, 1, 2)
     return replace(track, P=P)

@@ -3,7 +3,8 @@
 Innovations of a right model are white. Errors of the model are slow against the rows of a sensor, noise of the sensor is not: half
 the mean square of the *difference* of innovations that follow each other is the part that is white. Where it is ``q`` times as
 large as the variances ``S = H P H' + R`` say, R is ``1 + (q - 1) S / R`` times too small, and the next pass takes it as large. What
-is slow is left to the verdict (:mod:`truenorth.quality.innovations`).
+is slow is left to the verdict (:mod:`truenorth.quality.innovations`). And of what a receiver says of its fixes, the part that is
+not white is what they may share (:mod:`truenorth.quality.absolute`).
 
 Source: R. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Autom. Control 15 (1970).
 """
@@ -33,6 +34,7 @@ QUANTILES = {0.5: 0.4549, 0.8: 1.6424}
 WHEEL, WHEELS = "odometer", {0.95: 3.8415}
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
 STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
+LEAST_SQUARE = 0.05  # in parts of the variance: of differences that are expected to be nothing the scatter is no less
 LOUD = 3.0  # times its sigma, that an aid is so noisy that what a first pass found is made of noise
 
 
@@ -88,9 +90,7 @@ def _on_the_move(residuals: Residuals, track: Track) -> Residuals:
 
 def _factors(residuals: Residuals, source: Aiding, least: Array, tails: bool) -> Array:
     """(3,) by how much sigma is too small by the white part of the innovations; `least` where they are smaller."""
-    order = np.argsort(source.time, kind="stable")
-    row = order[np.clip(np.searchsorted(source.time[order], residuals.stamp), 0, len(order) - 1)]
-    e, S, R = residuals.innovation, residuals.sigma**2, source.sigma[row] ** 2
+    e, S, R = residuals.innovation, residuals.sigma**2, _said(residuals, source)
     found = np.ones(3)
     for axis in range(3):
         difference = np.diff(e[:, axis]) ** 2 / (S[1:, axis] + S[:-1, axis])
@@ -105,6 +105,47 @@ def _factors(residuals: Residuals, source: Aiding, least: Array, tails: bool) ->
         share = float(np.median(S[known, axis] / R[known, axis])) if known.any() else 0.0
         found[axis] = math.sqrt(max(1.0 + (q - 1.0) * share, least[axis] ** 2))
     return found
+
+
+def _said(residuals: Residuals, source: Aiding) -> Array:
+    """(M, 3) what a source says of the measurements of these residuals, variances."""
+    order = np.argsort(source.time, kind="stable")
+    row = order[np.clip(np.searchsorted(source.time[order], residuals.stamp), 0, len(order) - 1)]
+    return source.sigma[row] ** 2
+
+
+def white_part(track: Track, source: Aiding, axes: slice) -> tuple[float, float] | None:
+    """White noise of some components of a source, in parts of the variance that it says, and one sigma of that part.
+
+    Of differences of innovations that follow each other, ``E d^2 = (S_1 + S_2) + (q - 1)(R_1 + R_2)`` where noise has the variance
+    ``q R``: a regression on R. Such squares share a row with the next, and are correlated by a fourth: three in place of two.
+
+    Parameters
+    ----------
+    track : Track
+        Of a pass with this source.
+    source : Aiding
+    axes : slice
+        Components that have one part together.
+
+    Returns
+    -------
+    (part, sigma), or None
+        None: too few measurements to say.
+    """
+    residuals = next((r for r in track.residuals if r.name == source.name), None)
+    if residuals is None:
+        return None
+    used = residuals.used
+    e, S, R = residuals.innovation[used, axes], residuals.sigma[used, axes] ** 2, _said(residuals, source)[used, axes]
+    both, said = S[1:] + S[:-1], R[1:] + R[:-1]
+    squares, share = np.diff(e, axis=0) ** 2 / both - 1.0, said / both
+    there = np.isfinite(squares) & np.isfinite(share)
+    if int(there.sum()) < FEWEST or not (weight := float(np.sum(share[there] ** 2))) > 0.0:
+        return None
+    part = 1.0 + float(np.sum((squares * share)[there])) / weight
+    expected = np.maximum(1.0 + (part - 1.0) * share[there], LEAST_SQUARE)
+    return part, math.sqrt(3.0 * float(np.sum((share[there] * expected) ** 2))) / weight
 
 
 def louder(aiding: Sequence[Aiding], factors: Mapping[str, Array]) -> list[Aiding]:
