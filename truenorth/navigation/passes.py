@@ -98,6 +98,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     if later is not given:
         given = later
         track = plan.run(plan.sources(given), smooth=smooth)
+    plan, given, track = _all_shown(plan, given, track, smooth)
     for _ in range(2):  # what is noise hides a delay
         given, track = _of_two_moments(plan, given, track, smooth)
         as_it_was = plan
@@ -148,6 +149,11 @@ def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: b
     return (apart, other) if explained_by_two(other, track) else (plan, track)
 
 
+def _lost(track: Track) -> bool:
+    """Whether the gates of a track keep out more of a sensor's rows than chance and some jumps do."""
+    return max((r.rejected / max(len(r.time), 1) for r in track.residuals), default=0.0) > limit("rejected")
+
+
 def _not_lost(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
     """The plan with all of an antenna's swing as noise, and its track, where that keeps a track that is lost; else the same ones.
 
@@ -155,8 +161,12 @@ def _not_lost(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> 
     is. How much of it is noise is learnt once delays are found (:func:`_with_unseen_swing`).
     """
     receiver = given.get(Gnss.key)
-    lost = max((r.rejected / max(len(r.time), 1) for r in track.residuals), default=0.0) > limit("rejected")
-    if not lost or not isinstance(receiver, Gnss) or not (antenna := receiver.mounting) or antenna.latency_sigma == 0.0:
+    if (
+        not _lost(track)
+        or not isinstance(receiver, Gnss)
+        or not (antenna := receiver.mounting)
+        or antenna.latency_sigma == 0.0
+    ):
         return plan, track
     other = _with_swing(plan, given, track, np.hypot(antenna.lever_arm, antenna.lever_arm_sigma), OF_ANY_PHASE)
     try:
@@ -164,6 +174,29 @@ def _not_lost(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> 
     except DataError:  # the filter broke down
         return plan, track
     return (other, quiet) if explained_by_two(quiet, track) else (plan, track)
+
+
+def _all_shown(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, dict[str, Any], Track]:
+    """The plan without a swing as noise, its delays and its track, where they explain the log as well; else what was given.
+
+    Of an arm that is known: the swing was late, and with the noise the delay is found too coarsely to end it.
+    """
+    receiver = given.get(Gnss.key)
+    if (
+        not plan.unseen
+        or not isinstance(receiver, Gnss)
+        or not (antenna := receiver.mounting)
+        or antenna.lever_arm_sigma > 0.0
+    ):
+        return plan, given, track
+    shown = replace(plan, unseen=0.0, scattered={})
+    free = {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()}
+    try:
+        later = delayed(shown, given, shown.run(shown.sources(mounted_as(given, free))))
+        quiet = shown.run(shown.sources(later), smooth=smooth)
+    except DataError:  # the filter broke down
+        return plan, given, track
+    return (plan, given, track) if _lost(quiet) or explained_by_two(track, quiet) else (shown, later, quiet)
 
 
 def _with_unseen_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
