@@ -170,7 +170,10 @@ def test_an_encoder_that_is_off_wobbles(runs):
         assert not found(angles)
         assert np.degrees(found(angles + np.radians([0.0, 0.1]))["encoder.zero"]["off"]) == pytest.approx(0.1, abs=0.01)
         for axis in range(2):
-            disc = found(angles + np.radians(0.3) * np.sin(angles) * np.eye(2)[axis])["encoder.disc"]
+            key = ("encoder.disc_or_sway", "encoder.disc")[
+                axis
+            ]  # the outer axis turns at one rate: a sway may look the same
+            disc = found(angles + np.radians(0.3) * np.sin(angles) * np.eye(2)[axis])[key]
             assert disc["axis"] == str(axis + 1)
             assert np.degrees(disc["size"]) == pytest.approx(0.3, abs=0.01)
 

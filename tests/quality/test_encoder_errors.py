@@ -8,7 +8,8 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.quality.encoder import encoder_evidence
-from truenorth.quality.encoder_errors import Turns, error_evidence, errors_of, f_limit
+from truenorth.quality.encoder_errors import error_evidence, errors_of, f_limit
+from truenorth.quality.encoder_patterns import Turns
 from truenorth.quality.encoder_slips import slip_of
 from truenorth.quality.prediction import filtered_back, prediction, step_energies
 from truenorth.records import ImuRecord
@@ -26,11 +27,13 @@ def sea(rng, time, size):
     return x
 
 
-def made(rng, axes=2, size=0.02, duration=300.0, off=lambda time, angles: 0.0 * angles, noise=ARCSEC):
-    """Turns of a base with axes z and x that spin on it, `off` (K, A) what the angles are off by."""
+def made(
+    rng, axes=2, size=0.02, duration=300.0, off=lambda time, angles: 0.0 * angles, noise=ARCSEC, way=lambda time: time
+):
+    """Turns of a base with axes z and x that spin on it, `off` (K, A) what the angles are off by, `way` (s) how they go on."""
     time = np.arange(0.0, duration, 0.1)
     rates = np.radians(rng.uniform([8.0, 2.0], [18.0, 6.0]))[:axes]
-    angles = np.outer(time, rates) + rng.uniform(0.0, 6.0, axes)
+    angles = np.outer(way(time), rates) + rng.uniform(0.0, 6.0, axes)
     C = C_bs_from_angles("zx"[:axes], angles)
     directions = (np.broadcast_to([0.0, 0.0, 1.0], (len(time), 3)), C[:, :, 0])[:axes]
     turn = sea(rng, time, size) + noise * rng.standard_normal((len(time), 3))
@@ -73,7 +76,8 @@ def test_an_error_is_found_as_large_as_it_is(name, runs):
         if found is None:
             missed += 1
             continue
-        fit, beyond = found
+        fit, beyond, like_sway = found
+        assert like_sway == (name == "1.1")  # the axes turn at one rate
         if beyond < 1.0:
             continue
         x, P = fit.group(name)
@@ -92,6 +96,48 @@ def test_a_base_that_swings_as_fast_as_the_axis_turns_is_not_its_disc(period):
     )
     swung = Turns(**{**vars(turns), "turn": turns.turn + swing})
     assert [item for item in error_evidence(swung) if item.kind != "hint"] == []
+
+
+@few_and_all(12, few=2)
+@pytest.mark.parametrize("size", [0.1, 1.0, 8.0])
+@pytest.mark.parametrize("axes", [1, 2])
+def test_a_sway_of_the_axis_period_is_in_sigma(axes, size, runs):
+    """About the outer axis, once a turn of it to the last digit: a disc looks the same, and neither is a contradiction."""
+    for run in range(runs):
+        rng = np.random.default_rng([run, 9])
+
+        def off(time, angles, rng=rng):
+            return np.radians(size) * np.cos(angles[:, [0]] - rng.uniform(0.0, 6.0)) * np.eye(axes)[0]
+
+        (found,) = error_evidence(made(rng, axes, np.radians(0.05), off=off))
+        assert (found.key, found.kind) == ("encoder.disc_or_sway", "hint")
+        assert found.effect.heading == pytest.approx(np.radians(size), rel=0.1)
+
+
+def there_and_back(time):
+    """Three ways of 100 s and a bit, the second one back."""
+    return np.interp(time, [0.0, 97.0, 201.0, 300.0], [0.0, 97.0, -7.0, 92.0])
+
+
+@few_and_all(12, few=2)
+def test_an_axis_that_turns_back_tells_its_disc_from_a_sway(runs):
+    """0.2 deg: a disc goes back with the axis, and is one; a sway of its period goes on, and is none."""
+    for run in range(runs):
+        rng = np.random.default_rng([run, 10])
+        phase = rng.uniform(0.0, 6.0)
+
+        def disc(time, angles, phase=phase):
+            return np.radians(0.2) * np.cos(angles - phase)
+
+        found = error_evidence(made(rng, 1, np.radians(0.05), off=disc, way=there_and_back))
+        assert [(item.key, item.kind) for item in found] == [("encoder.disc", "bounded")]
+
+        def sway(time, angles, phase=phase):
+            rate = np.abs(angles[1] - angles[0]) / 0.1
+            return np.radians(0.2) * np.cos(rate * time[:, None] - phase)
+
+        found = error_evidence(made(rng, 1, np.radians(0.05), off=sway, way=there_and_back))
+        assert [item for item in found if item.kind != "hint"] == []
 
 
 @few_and_all(30, few=4)
@@ -151,6 +197,8 @@ def test_energies_of_whitened_steps():
     white = prediction(x, np.ones(80, dtype=bool), 6)
     steps = [np.sum(white(u * (np.arange(80) >= t0)[:, None]) ** 2) for t0 in range(80)]
     np.testing.assert_allclose(step_energies(u, white), steps, rtol=1e-9, atol=1e-9)
+    lag_by_lag = sum(white.a[lag] / white.sigma * x[6 - lag : 80 - lag] for lag in range(7))
+    np.testing.assert_allclose(white(x), lag_by_lag, rtol=1e-12, atol=1e-12)
     e = rng.standard_normal((74, 3))
     assert np.sum(e * white(u)) == pytest.approx(np.sum(filtered_back(e, white) * u))
 

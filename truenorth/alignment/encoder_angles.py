@@ -112,7 +112,7 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     given = angles_at(encoder, time, axes)
     for _ in range(PASSES):
         J = _axes_seen(axes, 0.5 * (angles[1:] + angles[:-1]))
-        turned = np.einsum("kai,ki->ka", np.linalg.pinv(J), dtheta)
+        turned = np.einsum("kai,ki->ka", _inverse(J, axes), dtheta)
         by_gyros = np.concatenate([np.zeros((1, len(axes))), np.cumsum(turned, axis=0)])
         at_rows = np.stack([np.interp(time, edges, column) for column in by_gyros.T], axis=-1)
         own = np.unwrap(given - at_rows, axis=0)  # the gyros know by how many turns
@@ -141,6 +141,12 @@ def _axes_seen(axes: Sequence[str], angles: Array) -> Array:
         for i, axis in enumerate(axes)
     ]
     return np.stack(seen, axis=-1)
+
+
+def _inverse(J: Array, axes: Sequence[str]) -> Array:
+    """(K, A, 3) pseudo-inverse of the directions of axes: of two that are perpendicular it is their transpose."""
+    upright = len(axes) == len(set(axes)) < 3
+    return np.swapaxes(J, 1, 2) if upright else np.asarray(np.linalg.pinv(J))
 
 
 def _shaped(angles: Array) -> Array:

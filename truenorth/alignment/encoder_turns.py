@@ -14,7 +14,7 @@ from truenorth.core.indexing import DIRECTIONS, C_bs_from_angles, chained
 from truenorth.errors.matrices import MATRICES, matrices_of, without_errors
 from truenorth.errors.staying import BIASES, STATES
 from truenorth.quality.encoder import mean_attitude
-from truenorth.quality.encoder_errors import Turns
+from truenorth.quality.encoder_patterns import Turns
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.increments import increments

@@ -10,7 +10,8 @@ An autoregression may take an error for sway that is as regular: it is that of w
 from pass to pass, and allows for a noise about as large as what is left of them. Sway may go with the axes for a while. So an error
 of the angles has to stand out against patterns by which no such error turns the base: as fast, but mirrored or about other axes,
 and nearly as fast, about the same ones. It has to do so with longer and shorter autoregressions, and against a line of the sway
-that is nearly as fast.
+that is nearly as fast. A disc of an axis that turns at one rate looks as a sway of that period does
+(:mod:`truenorth.quality.encoder_patterns`): it is in sigma, and no contradiction.
 
 Source: G. Jenkins, D. Watts, Spectral Analysis and its Applications, Holden-Day, 1968 (generalised least squares by whitening).
 """
@@ -18,14 +19,16 @@ Source: G. Jenkins, D. Watts, Spectral Analysis and its Applications, Holden-Day
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.student import student_limit
 from truenorth.quality.encoder import USUAL_ZERO
+from truenorth.quality.encoder_patterns import LIKE, Turns, bell, lines_in_time, own_share, patterns_of, unlike
 from truenorth.quality.prediction import Whitener, prediction
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -38,9 +41,7 @@ FEWEST = 6  # samples for each of an order
 SHORTEST = 40  # samples that show anything
 CELL = 1.0  # s from sample to sample for what goes with the angles
 FASTEST = 0.7  # rad by which an axis turns from sample to sample: twice as much is sampled well enough
-HARMONICS = (1, 2)
 NEARER = tuple(0.25 * k for k in range(-12, 13) if abs(k) > 1)  # the same, of a line
-DETUNED = (-3, -2, -1, 1, 2, 3)  # turns more in the whole log, of patterns nearly as fast
 PRODUCTS = (
     1.0  # times what products of the sway show of an outer axis' pattern, a line as its own is: an error is larger
 )
@@ -55,61 +56,6 @@ STEADY = 0.05  # of its largest rate, by which that of an axis changes: a delay 
 MOST_GONE = 40  # samples in gaps
 # rad, of white noise that the autoregressions of the passes allow for: a line no higher, left over from an error, is no sway
 NOISES = (1.7e-4, 3.5e-5, 0.9e-5)
-
-
-@dataclass(frozen=True)
-class Turns:
-    """How the base turns about its mean attitude, at even times.
-
-    Attributes
-    ----------
-    time : (K,) array, s
-    turn : (K, 3) array, rad
-        Rotation vector from the mean attitude, its axes.
-    there : (K,) bool array
-        Whether the encoder has a row there.
-    angles : (K, A) array, rad
-    C_bs : (K, 3, 3) array
-        Attitude of the IMU in the base.
-    directions : tuple of A (K, 3) arrays
-        Of the axes in the base, the outermost first.
-    gyro : (K, 3, m) array
-        By what errors of the gyros turn the base.
-    gyro_sigma : (m,) array
-        Their one-sigmas.
-    up : (3,) array
-        The vertical in the base, in the mean.
-    """
-
-    time: Array
-    turn: Array
-    there: Mask
-    angles: Array
-    C_bs: Array
-    directions: tuple[Array, ...]
-    gyro: Array
-    gyro_sigma: Array
-    up: Array
-
-    @property
-    def step(self) -> float:
-        """Between the times, s."""
-        return float(self.time[1] - self.time[0])
-
-    def thinned(self, cell: float) -> Turns:
-        """Those of times about `cell` s apart."""
-        every = max(1, round(cell / self.step))
-        rows = slice((len(self.time) - 1) % every, None, every)  # the last one is there
-        return replace(
-            self,
-            time=self.time[rows],
-            turn=self.turn[rows],
-            there=self.there[rows],
-            angles=self.angles[rows],
-            C_bs=self.C_bs[rows],
-            directions=tuple(u[rows] for u in self.directions),
-            gyro=self.gyro[rows],
-        )
 
 
 @dataclass(frozen=True)
@@ -172,7 +118,7 @@ def fitted(
         Columns to fit besides, group ``more``.
     """
     nuisance, sigma = _nuisance(turns)
-    named = dict(_patterns(turns)) | ({} if more is None else {"more": more})
+    named = dict(patterns_of(turns)) | ({} if more is None else {"more": more})
     gone = np.flatnonzero(~turns.there)
     missing = np.zeros((len(turns.time), 3, 3 * gone.size))
     for i, row in enumerate(gone):
@@ -187,8 +133,8 @@ def fitted(
     base = X[:, :, :6]
     start = np.concatenate([base, X[:, :, len(sigma) : first]], axis=2)
     # Weighted by a bell, that sway, however large, does not leak into what is slower.
-    seen = (start * _bell(turns)[:, None, None]).reshape(-1, start.shape[2])
-    left = r - start @ np.linalg.lstsq(seen, (r * _bell(turns)[:, None]).ravel(), rcond=None)[0]
+    seen = (start * bell(turns)[:, None, None]).reshape(-1, start.shape[2])
+    left = r - start @ np.linalg.lstsq(seen, (r * bell(turns)[:, None]).ravel(), rcond=None)[0]
     given, order = white, min(order, len(turns.time) // FEWEST)
     for noise in noises if given is None else noises[:1]:
         white = given or prediction(left, turns.there, order, noise)
@@ -200,12 +146,6 @@ def fitted(
         left = r - X @ found
     assert white is not None
     return Fit(turns, white, left, (y - W @ found).reshape(-1, 3), W.reshape(-1, 3, X.shape[2]), C, found, groups)
-
-
-def _bell(turns: Turns) -> Array:
-    """(K,) weights that fade at both ends, zero where there is no row."""
-    K = len(turns.time)
-    return np.where(turns.there, np.sin(math.pi * (np.arange(K) + 0.5) / K) ** 4, 0.0)
 
 
 def _bridged(turns: Turns) -> Array:
@@ -235,56 +175,17 @@ def _nuisance(turns: Turns) -> tuple[Array, Array]:
     return np.concatenate(columns, axis=2), np.concatenate(sigma)
 
 
-def _waves(direction: Array, phase: Array) -> Array:
-    """(K, 3, 2) cosine and sine of a phase (K,) about a direction (K, 3)."""
-    return np.stack([direction * np.cos(phase)[:, None], direction * np.sin(phase)[:, None]], axis=2)
-
-
-def _patterns(turns: Turns) -> Iterator[tuple[str, Array]]:
-    """By what errors of the angles turn the base, by name: ``zero``, and ``1.2`` for the first axis twice a turn."""
-    if len(turns.directions) > 1:
-        yield "zero", turns.directions[-1][:, :, None]
-    for axis, u in enumerate(turns.directions):
-        for n in HARMONICS:
-            yield f"{axis + 1}.{n}", _waves(u, n * turns.angles[:, axis])
-
-
-def _unlike(turns: Turns, name: str, detuned: Sequence[float] = DETUNED) -> tuple[list[Array], list[Array]]:
-    """Patterns by which no error of the angles turns the base, by families: as fast as that of a name, and nearly as fast."""
-    outer, share = turns.directions[0], 2.0 * math.pi * np.linspace(0.0, 1.0, len(turns.time))
-    a = turns.angles[:, 0]
-    across = np.cross(outer, np.eye(3)[int(np.argmin(np.abs(outer[0])))])
-    across /= np.linalg.norm(across, axis=1)[:, None]
-    if name.startswith("1"):
-        n = int(name[-1])
-        same = [_waves(v, n * a) for v in (across, np.cross(outer, across))]
-        return same, [_waves(outer, n * a + k * share) for k in detuned]
-    u, quarter = turns.directions[1], np.cross(outer, turns.directions[1])
-
-    def turned(by: Array) -> Array:
-        c, s = np.cos(by)[:, None], np.sin(by)[:, None]
-        pair = np.stack([c * u + s * quarter, c * quarter - s * u], axis=2)
-        if name == "zero":
-            return pair
-        b = int(name[-1]) * turns.angles[:, 1]
-        return np.concatenate([pair * np.cos(b)[:, None, None], pair * np.sin(b)[:, None, None]], axis=2)
-
-    still = np.zeros(len(a))
-    same = [turned(still)[:, :, 1::2], turned(-2.0 * a)]
-    return same, [turned(way + k * share) for way in (still, -2.0 * a) for k in detuned]
-
-
 def _shown(turns: Turns, x: Array, pattern: Array) -> float:
     """Amplitude, rad, of a pattern (K, 3, n) in a motion (K, 3), both weighted by a bell."""
-    bell = _bell(turns)[:, None]
-    x = (x - np.sum(x * bell, axis=0) / np.sum(bell)) * bell
-    w = (pattern * bell[:, :, None]).reshape(x.size, -1)
+    weight = bell(turns)[:, None]
+    x = (x - np.sum(x * weight, axis=0) / np.sum(weight)) * weight
+    w = (pattern * weight[:, :, None]).reshape(x.size, -1)
     return float(np.linalg.norm(w.T @ x.ravel() / np.sum(w**2, axis=0)))
 
 
 def _line(fit: Fit, name: str) -> tuple[Array, float]:
     """(K, 3, n) the pattern nearly as fast as that of a name that the sway shows most of, and its amplitude there, rad."""
-    patterns = _unlike(fit.turns, name, NEARER)[1]
+    patterns = unlike(fit.turns, name, NEARER)[1]
     return max(((each, _shown(fit.turns, fit.sway, each)) for each in patterns), key=lambda item: item[1])
 
 
@@ -299,7 +200,7 @@ def beyond_chance(fit: Fit, name: str) -> float:
     """By how much a group stands out, in units of what chance and a sway that goes with the axes allow: above one it is there."""
     ratio, size = fit.ratio(name), fit.groups[name].stop - fit.groups[name].start
     noise = 1.0
-    for i, patterns in enumerate(_unlike(fit.turns, name)):
+    for i, patterns in enumerate(unlike(fit.turns, name)):
         own, chi = fit.gains(np.concatenate(patterns, axis=2))
         chi = chi[own > OWN]
         if not chi.size:
@@ -319,8 +220,16 @@ def f_limit(chance: float, first: int, second: int) -> float:
     return float((chance ** (-2.0 / second) - 1.0) * second / 2.0)
 
 
-def errors_of(turns: Turns, slip: Callable[[Turns], Array] | None = None) -> dict[str, tuple[Fit, float]]:
-    """By the name of what stands out the fit that shows it, and by how much it is beyond chance."""
+class Standing(NamedTuple):
+    """An error of the angles that stands out."""
+
+    fit: Fit  # that shows it
+    beyond: float  # by how much it is beyond chance
+    like_sway: bool  # whether a sway of the base may look the same
+
+
+def errors_of(turns: Turns, slip: Callable[[Turns], Array] | None = None) -> dict[str, Standing]:
+    """By name what stands out."""
     turns = turns.thinned(
         min(CELL, FASTEST / max(float(np.max(np.abs(np.gradient(turns.angles, turns.step, axis=0)))), 1e-6))
     )
@@ -330,7 +239,7 @@ def errors_of(turns: Turns, slip: Callable[[Turns], Array] | None = None) -> dic
     fits = [fitted(turns, order, more) for order in ORDERS]
     hint = (limit("hint of an encoder's error") / limit("indexer")) ** 2
     found = {}
-    for name, pattern in _patterns(turns):
+    for name, pattern in patterns_of(turns):
         beyond = min(beyond_chance(fit, name) for fit in fits)
         by_products = PRODUCTS * _by_products(turns, pattern) if name.startswith("1") else 0.0
         if beyond <= hint or np.linalg.norm(fits[0].group(name)[0]) < by_products:
@@ -338,14 +247,37 @@ def errors_of(turns: Turns, slip: Callable[[Turns], Array] | None = None) -> dic
         fit, (line, amplitude) = fits[0], _line(fits[0], name)
         size = float(np.linalg.norm(fit.group(name)[0]))
         if amplitude > LINE * size:
-            besides = line if more is None else np.concatenate([more, line], axis=2)
-            fit, *others = (fitted(turns, order, besides) for order in ORDERS)
+            fit, *others = (fitted(turns, order, _both(more, line)) for order in ORDERS)
             beyond = min(beyond, *(beyond_chance(each, name) for each in (fit, *others)))
-        if (
-            beyond > hint
-        ):  # below all that the base sways by about as fast, or in the sea's band, it is a hint, however clear
-            found[name] = fit, beyond if size > amplitude and name != IN_THE_SEA else min(beyond, UNSURE)
+        if beyond <= hint:
+            continue
+        like_sway = name != "zero" and _like_sway(turns, name, pattern, more)
+        # Below all that the base sways by about as fast, or in the sea's band, it is a hint, however clear; so it is where a sway
+        # looks the same.
+        sure = size > amplitude and name != IN_THE_SEA and not like_sway
+        found[name] = Standing(fit, beyond if sure else min(beyond, UNSURE), like_sway)
+    disc, zero = found.get("1.1"), found.get("zero")
+    # A sway of the outer axis' period is about no axis alone: what it makes of a zero is smaller.
+    if disc is not None and zero is not None and disc.like_sway:
+        sizes = [float(np.linalg.norm(item.fit.group(name)[0])) for name, item in (("zero", zero), ("1.1", disc))]
+        if sizes[0] < sizes[1]:
+            found["zero"] = zero._replace(beyond=min(zero.beyond, UNSURE))
     return found
+
+
+def _like_sway(turns: Turns, name: str, pattern: Array, more: Array | None) -> bool:
+    """Whether a sway of one line may be the disc of a name: the two are one, or what tells them apart does not show a disc."""
+    lines = lines_in_time(turns, name)
+    if lines is None:
+        return False
+    return (
+        own_share(pattern, lines) < LIKE
+        or min(beyond_chance(fitted(turns, order, _both(more, lines)), name) for order in ORDERS) < 1.0
+    )
+
+
+def _both(more: Array | None, columns: Array) -> Array:
+    return columns if more is None else np.concatenate([more, columns], axis=2)
 
 
 def error_evidence(
@@ -366,7 +298,7 @@ def error_evidence(
         One sigma that was said of the angles: an error of that size is in sigma already.
     """
     found = []
-    for name, (fit, beyond) in errors_of(turns, slip).items():
+    for name, (fit, beyond, like_sway) in errors_of(turns, slip).items():
         x, P = fit.group(name)
         size, sigma = float(np.linalg.norm(x)), math.sqrt(float(np.trace(P)) / len(x))
         if size < limit("by chance") * said:
@@ -380,6 +312,9 @@ def error_evidence(
         tilted = math.sqrt(max(1.0 - float(np.mean(turns.directions[axis] @ turns.up)) ** 2, 0.0)) if axis == 0 else 1.0
         sways = float(np.max(np.linalg.norm(turns.turn, axis=1)))
         key = "encoder.disc" if name.endswith("1") else "encoder.disc_twice"
+        if like_sway:
+            key = "encoder.disc_or_sway"
         figures = {"axis": str(axis + 1), "size": size, "sigma": sigma}
-        found.append(Evidence(key, figures, kind, Effect(size, min(tilted + sways, 1.0) * size), ("encoder",)))
+        remedies = ("turn_back",) if like_sway else ("encoder",)
+        found.append(Evidence(key, figures, kind, Effect(size, min(tilted + sways, 1.0) * size), remedies))
     return found

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.quality.encoder import USUAL_ZERO
-from truenorth.quality.encoder_errors import NOISES, Fit, Turns, fitted, looks
+from truenorth.quality.encoder_errors import NOISES, Fit, fitted, looks
+from truenorth.quality.encoder_patterns import Turns
 from truenorth.quality.prediction import filtered_back, step_energies
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit

@@ -186,6 +186,10 @@ OF_SENSORS = {
         "angle {axis} of the encoder is off by {size:deg|.3f} ± {sigma:deg|.3f} deg to and fro, twice a turn: the base would "
         "wobble as the axis turns"
     ),
+    "encoder.disc_or_sway": (
+        "angle {axis} of the encoder may be off by {size:deg|.3f} ± {sigma:deg|.3f} deg to and fro as the axis turns, or the base "
+        "sways as fast: while the axis turns at one rate, nothing tells the one from the other"
+    ),
     "encoder.zero": (
         "the zero of the inner axis' angle is off by {off:deg|+.3f} ± {sigma:deg|.3f} deg, or the encoder is late or early: the "
         "base would wobble as the outer axis turns"

@@ -20,6 +20,7 @@ REMEDIES = {
     "common_clock": "check that both come from one clock and one filter",
     "grid_north": "check whether they count from grid north",
     "encoder": "check the order, signs, zero and clock of the indexer's angles",
+    "turn_back": "let the axis turn both ways, rest, or turn at another rate for a while",
     "bandwidths": "give the bandwidths of gyros and accelerometers in the specification",
     "sensor_axes": "check its axes and unit",
     "imu_axes": "check the IMU's axes",
