@@ -49,6 +49,7 @@ NOT_SAID = {
         "slip": ONE_VALUE,
         "compliance": ONE_VALUE,
         "velocities": "found in the log; a latency that is said is that of places and velocities",
+        "drift": "found in the log, wherever the latency is not said",
     },
     "Barometer": {"record": ELSEWHERE, "mounting": "the weather's usual error"},
     "Attitude": {"record": ELSEWHERE},
