@@ -86,6 +86,14 @@ def test_numbers_of_android(tmp_path):
         read_imu(write(tmp_path / "log.csv", rows, "timestamp_ns,type,x,y,z,accuracy", line))
 
 
+def test_of_two_clocks_both_readers_take_the_same(tmp_path):
+    line = "{ns},{ms},{name},{x:.9f},{y:.9f},{z:.9f}"
+    for header in ("timestamp_ns,timestamp_ms,sensor_type,x,y,z", "timestamp,timestamp_ms,sensor_type,x,y,z"):
+        path = write(tmp_path / "log.csv", rows_of(GYRO, ACCEL, FIXES), header, line)
+        assert read_imu(path).time[0] == pytest.approx(1000.02, abs=1e-6)
+        np.testing.assert_allclose(read_gnss(path).time, 1000.0 + T[::100], atol=1e-6)
+
+
 def test_numbers_of_an_app_of_its_own_are_refused(tmp_path):
     numbers = {"gyroscope": "1", "accelerometer": "0"}
     rows = [(t, numbers[name], *xyz) for t, name, *xyz in rows_of(GYRO, ACCEL)]

@@ -22,6 +22,7 @@ TYPES = re.compile(
     r"(?:android_)?(?:sensor_?)?(?:type|sensor)(?:_?(?:id|number|no))?"
 )  # a column of numbers of sensors
 NUMBERED = re.compile(r"(?:values?|val|v|data|axis|ch(?:annel)?)_?(\d)")  # columns of values without letters of axes
+GETSENSORDATA = ("ACCE", "GYRO", "MAGN", "GNSS", "GRAV", "LACC")  # names of its rows, whose clocks are in seconds
 OF_APP, OF_SENSOR = "system_time [s]", "sensor_time [s]"  # GetSensorData's two clocks
 DEEPEST, FEWEST, MOSTLY = (
     5,
@@ -135,7 +136,7 @@ def names_of(name: str, shape: Shape, lines: Sequence[str], rows: Sequence[int])
         names = shape.dialect.cells(found.replace("unix,", "")) if found else []
         names = names if len(names) == count else [word for word in names if word]
     if len(names) != count:
-        names = _by_what_they_do(shape, cells)
+        names = _by_what_they_do(name, shape, cells)
     numbered = [m for word in names if (m := NUMBERED.fullmatch(plain(split(word)[0])))]
     if len(numbered) >= 3 and not {"x", "y", "z"} <= {plain(word) for word in names}:
         start = [plain(split(word)[0]) for word in names].index(numbered[0][0])
@@ -150,21 +151,23 @@ def names_of(name: str, shape: Shape, lines: Sequence[str], rows: Sequence[int])
     return apart
 
 
-def _by_what_they_do(shape: Shape, cells: Sequence[Sequence[str]]) -> list[str]:
+def _by_what_they_do(name: str, shape: Shape, cells: Sequence[Sequence[str]]) -> list[str]:
     """Names of columns without a header: clocks never go back; the three numbers behind them are x, y, z."""
     names, left = [f"column {k + 1}" for k in range(len(cells[0]))], list("xyz")
     decimal = shape.dialect.decimal
-    clocks = 0
+    spans: list[float] = []  # of the clocks
     for k in range(len(names)):
         if k == shape.column or not all(shape.dialect.is_number(row[k]) for row in cells):
             continue
         values = np.array([float(row[k].replace(decimal, ".")) for row in cells])
         rises = len(values) > 3 and np.all(np.diff(values) >= 0.0) and len(set(values)) > 0.5 * len(values)
-        if len(left) == 3 and rises and clocks < 2 and len(names) - k > 3:
-            names[k] = ("time", OF_SENSOR)[clocks]
-            clocks += 1
+        span = float(values[-1] - values[0])
+        alike = not spans or any(abs(span / spans[0] / 10.0**power - 1.0) < 0.05 for power in range(-9, 10, 3))
+        if len(left) == 3 and rises and alike and len(spans) < 2 and len(names) - k > 3:
+            names[k] = ("time", "sensor_time")[len(spans)]
+            spans.append(span)
         elif left:
             names[k] = left.pop(0)
-    if clocks == 2:
-        names[names.index("time")] = OF_APP
+    if len(spans) == 2 and name in GETSENSORDATA:
+        names[names.index("time")], names[names.index("sensor_time")] = OF_APP, OF_SENSOR
     return names

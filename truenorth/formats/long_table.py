@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.formats.behaviour import gravity_level
+from truenorth.formats.behaviour import clock_readings, gravity_level
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.content import REMARKS_BYTES, text_of
 from truenorth.formats.long_shape import OF_APP, OF_SENSOR, Shape, names_of, refuse_other_numbers, shape_of
@@ -245,17 +245,28 @@ def _of_core_motion(gyro: Sensor, accel: Sensor, names: Sequence[str]) -> tuple[
     return gyro, accel, ""
 
 
+def _unit(times: Array) -> str | None:
+    """The unit of a clock of gyros, which have a usual rate."""
+    steps = np.diff(np.unique(times))
+    readings = clock_readings(float(np.median(steps)), float(times[0])) if len(steps) else []
+    return max(readings, key=lambda reading: reading.probability).unit if readings else None
+
+
 def _aid(path: Path, table: TextTable, part: str, shape: Shape, gyros: TextTable | None, notes: str) -> Columns:
     """The rows of a receiver or of a magnetometer, on the clock of the gyros."""
-    names = list(table.names)
-    clocks = [name for name in names if clock_of(name)[0]]
-    if gyros is not None:
+    clocks = [name for name in table.names if clock_of(name)[0]]
+    names = [f"column {k + 1}" if name in clocks[1:] else name for k, name in enumerate(table.names)]
+    unit = clock_of(clocks[0])[1] if clocks else None
+    if gyros is not None and clocks:
         of = Columns(path, gyros.names, gyros.read, gyros.column, gyros.place, True)
-        rows = Sensor("", np.zeros((0, 3)), (), {name: of.clock(name)[0] for name in clocks if name in gyros.names})
-        chosen = OF_APP if OF_APP in rows.clocks else _clock(path, rows)
-        clocks = [name for name in clocks if name == chosen] or clocks
+        read = {name: of.clock(name) for name in clocks if name in gyros.names}
+        rows = Sensor("", np.zeros((0, 3)), (), {name: times for name, (times, _) in read.items()})
+        chosen = OF_APP if OF_APP in rows.clocks else _clock(path, rows) or clocks[0]
+        unit = clock_of(chosen)[1] or (None if read.get(chosen, (0, ""))[1] is not None else _unit(rows.clocks[chosen]))
+        names = [f"column {k + 1}" if name in clocks else name for k, name in enumerate(table.names)]
+        names[table.names.index(chosen)] = chosen
+        clocks = [chosen]
     if clocks:
-        unit = clock_of(clocks[0])[1]
         names[names.index(clocks[0])] = f"time [{unit}]" if unit else "time"
     words = [plain(split(name)[0]) for name in names]
     plainly = {axis: words.index(axis) for axis in "xyz" if axis in words}
