@@ -131,11 +131,25 @@ def test_lines_of_getsensordata_have_two_clocks(tmp_path):
     np.testing.assert_allclose(np.degrees(gnss.lat), FIXES[2][:, 0], atol=1e-6)
 
 
-@pytest.mark.parametrize("line", ["{name},{ms},{x:.9f},{y:.9f},{z:.9f}", "{ms}\t{name}\t{x:.9f}\t{y:.9f}\t{z:.9f}"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "{name},{ms},{x:.9f},{y:.9f},{z:.9f}",
+        "{ms}\t{name}\t{x:.9f}\t{y:.9f}\t{z:.9f}",
+        "{name},{ms},{ns},{x:.9f},{y:.9f},{z:.9f}",
+        "{name} {x:.9f} {y:.9f} {z:.9f} {ms}",
+    ],
+)
 def test_a_prefix_without_a_header(tmp_path, line):
     names = {"gyroscope": "Gyro", "accelerometer": "Acc"}
     rows = [(t, names[name], *xyz) for t, name, *xyz in rows_of(GYRO, ACCEL)]
     check(read_imu(write(tmp_path / "log.txt", rows, "", line)))
+
+
+def test_units_behind_the_names(tmp_path):
+    names = {"gyroscope": "Gyroscope (deg/s)", "accelerometer": "Accelerometer (m/s^2)"}
+    record = read_imu(write(tmp_path / "log.csv", [(t, names[name], *xyz) for t, name, *xyz in rows_of(GYRO, ACCEL)]))
+    check(record, lambda t: np.radians(rates(t)))
 
 
 def test_gravity_and_linear_acceleration_are_no_accelerometers(tmp_path):

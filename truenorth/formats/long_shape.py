@@ -18,17 +18,13 @@ from truenorth.formats.names import plain
 from truenorth.formats.sensor_kinds import kind_of, kind_of_number
 from truenorth.formats.units import split
 
-TYPES = re.compile(
-    r"(?:android_)?(?:sensor_?)?(?:type|sensor)(?:_?(?:id|number|no))?"
-)  # a column of numbers of sensors
+# a column of numbers of sensors
+TYPES = re.compile(r"(?:android_)?(?:sensor_?)?(?:type|sensor)(?:_?(?:id|number|no))?")
 NUMBERED = re.compile(r"(?:values?|val|v|data|axis|ch(?:annel)?)_?(\d)")  # columns of values without letters of axes
 GETSENSORDATA = ("ACCE", "GYRO", "MAGN", "GNSS", "GRAV", "LACC")  # names of its rows, whose clocks are in seconds
 OF_APP, OF_SENSOR = "system_time [s]", "sensor_time [s]"  # GetSensorData's two clocks
-DEEPEST, FEWEST, MOSTLY = (
-    5,
-    4,
-    0.9,
-)  # columns that may hold the name, cells of a row, rows of the head with a known name
+DEEPEST, FEWEST = 8, 4  # columns that may hold the name, cells of a row
+MOSTLY = 0.9  # of the rows of the head have a known name
 
 
 @dataclass(frozen=True)
@@ -168,6 +164,9 @@ def _by_what_they_do(name: str, shape: Shape, cells: Sequence[Sequence[str]]) ->
             spans.append(span)
         elif left:
             names[k] = left.pop(0)
+        elif rises and not spans:  # behind the values
+            names[k] = "time"
+            spans.append(span)
     if len(spans) == 2 and name in GETSENSORDATA:
         names[names.index("time")], names[names.index("sensor_time")] = OF_APP, OF_SENSOR
     return names

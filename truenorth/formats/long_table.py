@@ -174,8 +174,10 @@ def _sensor(path: Path, table: TextTable, sensor: str, name: str, shape: Shape) 
             f"{path.name}: {name}: no columns of x, y and z among {listed(table.names)}; name them in the header"
         )
     found = sensor_of(name, sensor, of)
+    unit = split(name)[1]
     if shape.numbers or OF_ANDROID.match(name):
         unit = "rad/s" if sensor == "gyro" else "m/s^2"
+    if unit:
         return replace(found, headings=tuple(f"{split(heading)[0]} [{unit}]" for heading in found.headings))
     return found
 

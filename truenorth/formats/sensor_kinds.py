@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 
 from truenorth.formats.names import plain
+from truenorth.formats.units import split
 
 ACCELERATION = r"acc(?:e|l|el(?:eration|erometer|erometers)?)?"
 KINDS = {
@@ -37,7 +38,7 @@ def kind_of(name: str) -> str | None:
     """What a sensor of some name is: one of `KINDS`; None where that is not known."""
     if not name[:1].isalpha():
         return None
-    words = plain(name)
+    words = plain(split(name)[0])  # ``Gyroscope (rad/s)``
     return next((kind for kind, p in KINDS.items() if re.fullmatch(rf"{FIRST}(?:{p}){LAST}", words)), None)
 
 
