@@ -152,6 +152,14 @@ def test_units_behind_the_names(tmp_path):
     check(record, lambda t: np.radians(rates(t)))
 
 
+def test_columns_of_each_sensor_next_to_each_other(tmp_path):
+    path = tmp_path / "log.csv"
+    cells = {"accelerometer": "{},{},{},,,", "gyroscope": ",,,{},{},{}"}
+    rows = [f"{name},{t:.6f}," + cells[name].format(*xyz) for t, name, *xyz in rows_of(GYRO, ACCEL)]
+    path.write_text("\n".join(["sensor,time,acc_x,acc_y,acc_z,gyro_x,gyro_y,gyro_z", *rows]) + "\n")
+    check(read_imu(path))
+
+
 def test_gravity_and_linear_acceleration_are_no_accelerometers(tmp_path):
     shaken = np.column_stack([0.3 * np.sin(5.0 * T), 0.0 * T, 0.0 * T])
     linear, gravity = ("linear_acceleration", T, shaken), ("gravity", T, forces(T))

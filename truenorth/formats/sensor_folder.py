@@ -172,7 +172,8 @@ def sensor_of(name: str, sensor: str, table: Columns) -> Sensor:
         No columns of x, y and z.
     """
     plainly: dict[str, str] = {}
-    for column in table.names if table.named else ():
+    own = [column for column in table.names if (found := heading_of(column)) is not None and found.sensor == sensor]
+    for column in dict.fromkeys((*own, *table.names)) if table.named else ():
         bare, _ = split(column)
         words = plain(bare).split("_")
         heading = heading_of(column)
