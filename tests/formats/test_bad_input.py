@@ -295,3 +295,24 @@ def test_a_log_that_begins_in_the_midst_of_a_row(lacks, tmp_path):
     for key in ("time", "gyro", "accel"):
         np.testing.assert_array_equal(getattr(cut, key), getattr(whole, key))
     assert any("no whole row left out: 1, the first is line 1" in guess.value for guess in cut.taken_for)
+
+
+@pytest.mark.parametrize("name", ["%IMURATECORRIMUSA", "#CORRIMUDATAA"])
+def test_corrected_data_of_novatel_hold_no_gravity(tmp_path, name):
+    path = tmp_path / "log.txt"
+    path.write_text(f"{name},2200,1004.390;2200,1004.39,-1e-06,2e-06,1e-06,2e-05,1e-05,9e-05*7d3d1746\n" * 10)
+    with pytest.raises(DataError, match=r"log.txt: holds NovAtel's corrected IMU data, .*log RAWIMUSX"):
+        read_imu(path)
+
+
+def test_lines_that_a_spreadsheet_fills_up_are_no_rows(tmp_path):
+    time = 0.01 * np.arange(2000)
+    roll = 0.5 * np.sin(0.8 * time)
+    rows = np.column_stack(
+        [time, 9.81 * np.sin(roll), 0 * time, 9.81 * np.cos(roll), 0 * time, -np.gradient(roll, time), 0 * time]
+    )
+    above = ["Format=4,,,,,,", "Sensor,738,Label,Lumbar,,,", "Rate,100,,,,,", "time,ax,ay,az,gx,gy,gz"]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([*above, *(",".join(f"{x:.6f}" for x in row) for row in rows)]) + "\n")
+    record = read_imu(path)
+    np.testing.assert_allclose(record.accel, rows[:, 1:4], atol=1e-5)

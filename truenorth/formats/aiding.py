@@ -278,7 +278,7 @@ def open_log(
             columns = devices.columns(path, chosen, part or "gnss", values.get("topic"))
         else:
             own = columns_of_positions(path) if part == "gnss" and chosen == "csv" else None
-            columns = own or columns_of(path, chosen, named=bool(options.columns))
+            columns = own or columns_of(path, chosen, bool(options.columns), part)
         if not columns.named:
             example = ",".join(q.name for q in quantities[:4])
             raise DataError(

@@ -54,6 +54,10 @@ FOREIGN = {
     b"7z\xbc\xaf": "a 7z archive; unpack it",
     b"\xfd7zXZ": "xz data; unpack it",
     b"%PDF": "a PDF document",
+    **dict.fromkeys(
+        (b"#CORRIMU", b"%CORRIMU", b"#IMURATECORRIMU", b"%IMURATECORRIMU"),
+        "NovAtel's corrected IMU data, without gravity and the earth's rotation; log RAWIMUSX or RAWIMUS",
+    ),
 }
 SENTENCE = re.compile(rb"\s*\$(?:G[ABLNPQ]|BD)[A-Z]{3},")  # of a receiver
 TEXT = ("csv", "psins", "kf-gins")

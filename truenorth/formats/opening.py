@@ -7,7 +7,7 @@ from pathlib import Path
 from truenorth.formats.columns import Columns, columns_of_arrays
 
 
-def columns_of(path: Path, format: str, named: bool = True) -> Columns:
+def columns_of(path: Path, format: str, named: bool = True, part: str = "imu") -> Columns:
     """A log of any format as columns; of two-dimensional arrays each column is ``name[i]``, counted from 0.
 
     Parameters
@@ -16,6 +16,8 @@ def columns_of(path: Path, format: str, named: bool = True) -> Columns:
     format : str
     named : bool
         Whether the caller names columns; else those of toolboxes get our names.
+    part : str
+        What is read of a table with rows of several sensors: ``imu``, ``gnss`` or ``mag``.
 
     Raises
     ------
@@ -23,12 +25,14 @@ def columns_of(path: Path, format: str, named: bool = True) -> Columns:
         A damaged file, or one without a table.
     """
     if format in ("csv", "kf-gins", "psins"):
-        from truenorth.formats import vbo
+        from truenorth.formats import long_table, vbo
         from truenorth.formats.labelled import NOTE
         from truenorth.formats.text import open_table
 
         if vbo.is_one(path):
             return vbo.columns(path)
+        if (long := long_table.columns(path, part)) is not None:
+            return long
         table = open_table(path)
         labelled = NOTE in table.notes
         notes = table.notes if labelled else (*table.notes, table.dialect.words())

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,8 +40,8 @@ GNSS = re.compile(r"(?:location|gps|gnss)(?:_?(?:gps|gnss|fused|data|location))?
 
 
 @dataclass(frozen=True)
-class _Sensor:
-    """The file of one sensor: its clock, and values (N, 3) of x, y and z."""
+class Sensor:
+    """The rows of one sensor: its clocks, and values (N, 3) of x, y and z."""
 
     name: str
     values: Array
@@ -99,7 +99,36 @@ def columns(folder: Path) -> Columns:
         )
     gyro = _sensor(gyros[0], "gyro")
     clock, times = _clock(folder, gyro, files)
-    accel = _accel(folder, files, clock)
+    accel = with_gravity(
+        folder,
+        (_sensor(path, "accel") for path in [*_calibrated(files["accel"]), *files["accel"]]),
+        (_sensor(path, "accel") for path in files.get("gravity", ())),
+        clock,
+    )
+    values, signs = _specific_force(folder, accel)
+    return merged(folder, gyro, replace(accel, values=values), clock, times, signs)
+
+
+def merged(path: Path, gyro: Sensor, accel: Sensor, clock: str, times: Array, words: str = "") -> Columns:
+    """One table of two sensors: rows of the gyros, with accelerometers interpolated to them.
+
+    Parameters
+    ----------
+    path : Path
+        Of the log, for messages.
+    gyro, accel : Sensor
+    clock : str
+        The name of the clock of both; empty where there is none.
+    times : (N,) array
+        Of the gyros.
+    words : str
+        What else is to be said, such as ``"; signs turned"``.
+
+    Raises
+    ------
+    DataError
+        Sensors that do not overlap in time, or have other numbers of rows and no clock.
+    """
     rows = (
         (times >= accel.clocks[clock][0]) & (times <= accel.clocks[clock][-1])
         if clock in accel.clocks
@@ -107,21 +136,20 @@ def columns(folder: Path) -> Columns:
     )
     if clock not in accel.clocks and len(accel.values) != len(gyro.values):
         raise DataError(
-            f"{folder.name}: {gyro.name} has {len(gyro.values)} rows and {accel.name} {len(accel.values)}, without a clock of "
+            f"{path.name}: {gyro.name} has {len(gyro.values)} rows and {accel.name} {len(accel.values)}, without a clock of "
             "their own; expected as many of each"
         )
     if not rows.any():
-        raise DataError(f"{folder.name}: {gyro.name} and {accel.name} have no time in common by their column {clock}")
-    values, signs = _specific_force(folder, accel)
-    force = values if clock not in accel.clocks else at_times(times[rows], accel.clocks[clock], values)
+        raise DataError(f"{path.name}: {gyro.name} and {accel.name} have no time in common by their column {clock}")
+    force = accel.values if clock not in accel.clocks else at_times(times[rows], accel.clocks[clock], accel.values)
     table = {clock: times[rows]} if clock else {}
     table |= dict(zip(gyro.headings, gyro.values[rows].T)) | dict(zip(accel.headings, force.T))
     left = f", {len(times) - rows.sum()} rows of one of them alone left out" if not rows.all() else ""
-    merged = columns_of_arrays(folder, table)
+    whole = columns_of_arrays(path, table)
     moved = clock in accel.clocks and not _same(times[rows], accel.clocks[clock])
     moved_words = "; accelerometers interpolated to them, which takes some of their white noise away" if moved else ""
-    note = f"{gyro.name} and {accel.name}, rows of the gyros{left}{moved_words}{signs}"
-    return Columns(folder, merged.names, merged.read, merged.column, named=True, notes=(note,), whole=merged.whole)
+    note = f"{gyro.name} and {accel.name}, rows of the gyros{left}{moved_words}{words}"
+    return Columns(path, whole.names, whole.read, whole.column, named=True, notes=(note,), whole=whole.whole)
 
 
 def _calibrated(paths: Sequence[Path]) -> list[Path]:
@@ -129,31 +157,42 @@ def _calibrated(paths: Sequence[Path]) -> list[Path]:
     return [path for path in paths if "uncal" not in path.stem.casefold()] or list(paths)
 
 
-def _sensor(path: Path, sensor: str) -> _Sensor:
+def _sensor(path: Path, sensor: str) -> Sensor:
     """One file: its columns of x, y and z, with headings of an IMU's log, and its clocks."""
     table = open_table(path)
+    return sensor_of(path.name, sensor, Columns(path, table.names, table.read, table.column, table.place, table.named))
+
+
+def sensor_of(name: str, sensor: str, table: Columns) -> Sensor:
+    """The gyros (``gyro``) or accelerometers (``accel``) in a table of theirs alone; `name` says which, in messages.
+
+    Raises
+    ------
+    DataError
+        No columns of x, y and z.
+    """
     plainly: dict[str, str] = {}
-    for name in table.names if table.named else ():
-        bare, _ = split(name)
+    own = [column for column in table.names if (found := heading_of(column)) is not None and found.sensor == sensor]
+    for column in dict.fromkeys((*own, *table.names)) if table.named else ():
+        bare, _ = split(column)
         words = plain(bare).split("_")
-        heading = heading_of(name)
+        heading = heading_of(column)
         axis = heading.axis if heading is not None else words[-1] if words[-1] in "xyz" else words[0]
-        if axis in ("x", "y", "z") and not clock_of(name)[0]:
-            plainly.setdefault(axis, name)
+        if axis in ("x", "y", "z") and not clock_of(column)[0]:
+            plainly.setdefault(axis, column)
     if set(plainly) != set("xyz"):
-        raise DataError(f"{path.name}: no columns of x, y and z among {listed(table.names)}")
+        raise DataError(f"{name}: no columns of x, y and z among {listed(table.names)}")
     names = [plainly[axis] for axis in "xyz"]
-    units = [split(name)[1] for name in names]
+    units = [split(column)[1] for column in names]
     headings = tuple(
         f"{'angular_rate' if sensor == 'gyro' else 'acceleration'}_{a}" + (f" [{u}]" if u else "")
         for a, u in zip("xyz", units)
     )
-    whole = Columns(path, table.names, table.read, table.column, table.place, table.named)
-    clocks = {name: whole.clock(name)[0] for name in table.names if clock_of(name)[0]}
-    return _Sensor(path.name, table.read(names, False), headings, clocks)
+    clocks = {column: table.clock(column)[0] for column in table.names if clock_of(column)[0]}
+    return Sensor(name, table.read(names, False), headings, clocks)
 
 
-def _clock(folder: Path, gyro: _Sensor, files: dict[str, list[Path]]) -> tuple[str, Array]:
+def _clock(folder: Path, gyro: Sensor, files: dict[str, list[Path]]) -> tuple[str, Array]:
     """The name and the times of the gyros' clock; no name where there is none."""
     for name, times in gyro.clocks.items():
         if np.all(np.diff(times) > 0.0):
@@ -171,29 +210,34 @@ def _clock(folder: Path, gyro: _Sensor, files: dict[str, list[Path]]) -> tuple[s
     return "", np.zeros(len(gyro.values))
 
 
-def _accel(folder: Path, files: dict[str, list[Path]], clock: str) -> _Sensor:
-    """The accelerometers that hold gravity, or the sum of those without it and of gravity's own file."""
+def with_gravity(source: Path, accels: Iterable[Sensor], gravities: Iterable[Sensor], clock: str) -> Sensor:
+    """The accelerometers that hold gravity, or the sum of those without it and of gravity's own rows.
+
+    Raises
+    ------
+    DataError
+        There are none.
+    """
     seen = []
-    for path in [*_calibrated(files["accel"]), *files["accel"]]:
-        sensor = _sensor(path, "accel")
+    for sensor in accels:
         level = gravity_level(sensor.values)
         if accel_readings(level, np.nan, ("rates",)):
             return sensor
         seen.append((sensor, level))
-    for path in files.get("gravity", ()):
-        gravity, (sensor, _) = _sensor(path, "accel"), seen[0]
+    for gravity in gravities:
+        sensor, _ = seen[0]
         if clock in gravity.clocks and clock in sensor.clocks:
             both = sensor.values + at_times(sensor.clocks[clock], gravity.clocks[clock], gravity.values)
             if accel_readings(gravity_level(both), np.nan, ("rates",)):
-                return _Sensor(f"{sensor.name} + {gravity.name}", both, sensor.headings, sensor.clocks)
+                return Sensor(f"{sensor.name} + {gravity.name}", both, sensor.headings, sensor.clocks)
     sensor, level = seen[0]
     raise DataError(
-        f"{folder.name}: {sensor.name} shows {level:.3g} (median of the norm), which is gravity in no usual unit: the phone took "
+        f"{source.name}: {sensor.name} shows {level:.3g} (median of the norm), which is gravity in no usual unit: the phone took "
         "gravity out; expected the specific force: record the total acceleration, or gravity in a file of its own"
     )
 
 
-def _specific_force(folder: Path, accel: _Sensor) -> tuple[Array, str]:
+def _specific_force(folder: Path, accel: Sensor) -> tuple[Array, str]:
     """Accelerations in Android's signs, and what was done, in words: Apple's are opposite, so that at rest they point down.
 
     No log shows which of the two it has: a phone that lies on its screen looks alike. Sensor Logger writes it into a file.

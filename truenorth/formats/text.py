@@ -283,8 +283,11 @@ def _head(path: Path, text: bytes) -> list[tuple[int, str]]:
 
 
 def _are_row(dialect: Dialect, cells: Sequence[str], count: int) -> bool:
-    """Whether cells are a row of the table: as many, at least half of them numbers."""
-    return len(cells) == count and dialect.share(cells) >= 0.5 and sum(map(dialect.is_number, cells)) > 0
+    """Whether cells are a row of the table: as many, half of them numbers; with empty ones, more than half of the others."""
+    if len(cells) != count or dialect.share(cells) < 0.5 or not any(map(dialect.is_number, cells)):
+        return False
+    said = [cell for cell in cells if cell]  # a spreadsheet fills up lines above a header: ``Rate,100,,,``
+    return len(said) == count or dialect.share(said) > 0.5
 
 
 def _header(
