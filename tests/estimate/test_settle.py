@@ -62,24 +62,3 @@ def test_passes_that_go_round_come_to_rest(share):
     last = settle(log, Found, lambda found: float(np.abs(found.end).max()), most=200)
     assert last.moved < 0.02
     assert last.passes < 200
-
-
-def test_what_no_pass_takes_off_does_not_hide_that_heading_turns_to_and_fro():
-    """Heading whose steps are nine times too long, level that is right, and states of a motion that stay as they are."""
-
-    class Motion:
-        s = np.array([0.02, 0.0, 0.3])
-
-        def linearise(self):
-            heading = 9.0 * float(np.tanh(self.s[2] / 0.2)) * 0.2
-            return np.array([self.s[0], self.s[1], heading, 0.5, -0.2, 1.1, 0.6])
-
-        def correct(self, x):
-            self.s = self.s - x[:3]
-
-    def moved(found):
-        return max(abs(float(found.end[0])) / 0.01, abs(float(found.end[2])) / 0.4)
-
-    last = settle(Motion(), Found, moved, most=24)
-    assert last.moved < 0.02
-    assert last.passes < 24

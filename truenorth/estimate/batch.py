@@ -25,7 +25,6 @@ CONVERGED = 0.02  # a pass that moves no angle by more than this part of its sig
 ROUGHLY = 0.3  # the same part, above which the answer is not to be trusted
 LITTLE = 0.7  # a pass that moves back by more than this part of the one before comes to rest late or never
 BACK = -0.5  # likeness of two steps, from 1 (the same) to -1 (opposite), that go to and fro
-FORESEEN = 0.5  # of a share of a step, by which what is left of it may be off for the system to count as straight
 ROUNDS = 8  # passes, within which those that come to rest come nearer to it by ...
 NEARER = 0.8  # ... this part
 LEAST = 1.0 / 16.0  # of a step: with less they do not come that much nearer in so many, wherever they go
@@ -108,11 +107,6 @@ def settle(
     where they go round in more than two, or anyhow, and come no nearer in `ROUNDS` passes: of a swing of tens of degrees they
     went round in four for ever.
 
-    To and fro is asked of all states, each by itself, and of the attitude. Where heading shows by the square of an angle (an axis
-    that points north and whose scale factor is not known), Gauss and Newton's step is several times too long near the likeliest
-    heading, and what else is in the state does not show it. Where a share of a step leaves what it should the next is twice as
-    large, as in a region of trust (the same, section 4.1): heading at rest, level is not to come in by sixteenths.
-
     Parameters
     ----------
     log : Log
@@ -136,11 +130,8 @@ def settle(
             return Settled(found, passes, by)
         end = np.array(found.end)
         nearest, since = (by, 0) if by < NEARER * nearest else (nearest, since + 1)
-        back = by > LITTLE * before and (_likeness(end, last) < BACK or _turns_back(end, last))
-        if back or (since >= ROUNDS and share > LEAST):
+        if (since >= ROUNDS and share > LEAST) or (by > LITTLE * before and _likeness(end, last) < BACK):
             share, nearest, since = 0.5 * share, by, 0
-        elif share < 1.0 and _as_foreseen(end, last, share):
-            share = 2.0 * share
         before, last, end = by, end, share * end
         del found  # a pass takes memory: none of it stays for the next
         log.correct(end)
@@ -186,18 +177,6 @@ def moved_by(end: Array, track: Track, names: Iterable[str]) -> float:
     open_ = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     open_ = open_[sigma[open_] > 0.0]
     return float(np.max(np.abs(end[open_]) / sigma[open_]))
-
-
-def _turns_back(a: Array, b: Array) -> bool:
-    """Whether of two steps the one turns the attitude back from where the other turned it to."""
-    both = float(np.linalg.norm(a[PHI]) * np.linalg.norm(b[PHI]))
-    return float(a[PHI] @ b[PHI]) < BACK * both
-
-
-def _as_foreseen(a: Array, b: Array, share: float) -> bool:
-    """Whether of the turn of a step, a share of which was taken, about as much is left as of a straight system."""
-    off = a[PHI] - (1.0 - share) * b[PHI]
-    return bool(np.linalg.norm(off) < FORESEEN * share * np.linalg.norm(b[PHI]))
 
 
 def _likeness(a: Array, b: Array) -> float:
