@@ -1,11 +1,14 @@
 """Stops at which gyros show another rate than at the others: biases that change on the way."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import truenorth as tn
+from truenorth.alignment.in_motion_task import moving_task
+from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.navigation.stops import turned_in_stops
 from truenorth.simulation.scenario import read_scenario
 
@@ -48,3 +51,16 @@ def test_a_heading_that_such_a_change_turns_is_not_said_to_be_known():
     C = log.motion.states(np.array([answer.time])).C_nb[0]
     off = (answer.euler[0] - np.arctan2(C[0, 1], C[1, 1]) + np.pi) % (2.0 * np.pi) - np.pi
     assert answer.status == "inconsistent" or abs(off) < 4.0 * answer.euler_sigma[0]
+
+
+def test_a_turn_on_the_spot_between_stops_is_no_change():
+    """By 10 deg within 10 s while the van stands: its heading was called 79 deg uncertain, and the log was refused."""
+    log, gnss = van(0)
+    record = log.record
+    turning = ((record.time > 10.0) & (record.time < 20.0))[:, None] * np.radians([0.0, 0.0, -1.0])
+    turned = replace(
+        record, gyro=record.gyro + (turning * record.steps[:, None] if record.kind == "increments" else turning)
+    )
+    assert turned_in_stops(turned, None, gnss)[0].size >= 5
+    task = moving_task(turned, "consumer", None, gnss, None, None, None, (), True, None, 0.0)
+    assert shift_evidence(task, SimpleNamespace(time=record.time[[-1]], C_nb=np.eye(3)[None])) == []

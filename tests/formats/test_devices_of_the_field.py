@@ -9,8 +9,10 @@ from scipy.io import savemat
 from tests.formats.corpus.truth import DEG, truth
 from tests.formats.test_field_logs import MOVED, G, is_read, rows
 from tests.formats.test_second_reading import notes
+from truenorth.aiding.sensors import from_gnss
 from truenorth.core.errors import DataError
 from truenorth.formats import UnsureError, read_gnss, read_imu
+from truenorth.state.mounting import Mounting
 
 N = len(MOVED.time)
 
@@ -45,6 +47,41 @@ sats time lat long velocity heading height {name} event1
 STAMPS = ["235958.50", "235959.00", "235959.50", "000000.00", "000000.50"]
 
 
+def vbo(path, speed="kmh", sats=9, comment=""):
+    """A file of ten rows northwards with so many satellites."""
+    head = VBO.format(speed=speed, up="vertical velocity kmh", name="vertvel").replace("VBox II", comment + "VBox II")
+    fixes = [
+        f"{sats:03d} 1000{k:02d}.00 +03119.09973 +00058.49277 036.000 000.00 +00152.58 +000.360 00000"
+        for k in range(10)
+    ]
+    path.write_bytes((head + "\n".join(fixes) + "\n").encode("latin-1"))
+    return path
+
+
+@pytest.mark.parametrize("sats", [4, 6, 70, 134])
+def test_how_many_satellites_is_not_how_good_a_fix_is(tmp_path, sats):
+    """Six of them were taken for dead reckoning and left out, four for a fixed phase."""
+    record = read_gnss(vbo(tmp_path / "drive.vbo", sats=sats))
+    assert list(record.quality) == [1] * 10
+    assert [len(source.time) for source in from_gnss(record, Mounting())] == [10, 10]
+
+
+def test_a_sign_of_another_code_page_ends_no_line(tmp_path):
+    """Two dots of Windows: a row was lost for each."""
+    assert len(read_gnss(vbo(tmp_path / "drive.vbo", comment="wet\x85 \x0b"))) == 10
+
+
+@pytest.mark.parametrize(("speed", "factor"), [("mph", 0.44704), ("kts", 1852 / 3600), ("m/s", 1.0), ("kmh", 1 / 3.6)])
+def test_speed_in_the_unit_that_the_header_names(tmp_path, speed, factor):
+    record = read_gnss(vbo(tmp_path / "drive.vbo", speed=speed))
+    np.testing.assert_allclose(record.v_n[:, 1], 36.0 * factor)
+
+
+def test_a_speed_in_a_unit_that_nobody_knows(tmp_path):
+    with pytest.raises(DataError, match=r"drive.vbo: \[header\]: velocity in furlongs; expected a unit of speed"):
+        read_gnss(vbo(tmp_path / "drive.vbo", speed="furlongs"))
+
+
 @pytest.mark.parametrize(
     ("speed", "up", "name", "want"),
     [
@@ -66,7 +103,7 @@ def test_a_vbox(tmp_path, speed, up, name, want):
     np.testing.assert_allclose(np.degrees(record.lon[1:]), -58.49277 / 60.0)
     np.testing.assert_allclose(record.v_n[1:], np.tile([want[0], 0.0, want[1]], (4, 1)), atol=1e-9)
     assert np.isnan(record.lat[0])
-    assert list(record.quality) == [0, 9, 9, 9, 9]
+    assert list(record.quality) == [0, 1, 1, 1, 1]  # no satellites, no fix; of the others it does not say how good
     fixes[2] = fixes[2].replace("+03119.09973", "+O3119.09973")
     path.write_text(VBO.format(speed=speed, up=up, name=name) + "\n".join(fixes) + "\n")
     number = path.read_text().splitlines().index(fixes[2]) + 1

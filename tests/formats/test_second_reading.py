@@ -146,6 +146,7 @@ def test_a_receiver_s_week_that_ends_goes_on(tmp_path):
         ("%d/%m/%Y %H:%M:%S.%f", datetime(2021, 1, 31, 23, 59, 40), "the day first"),
         ("%m/%d/%Y %I:%M:%S.%f %p", datetime(2021, 3, 11, 11, 59, 40), "the month first: no number of theirs shows"),
         ("%d.%m.%Y %H:%M:%S.%f", datetime(2021, 3, 11, 10, 0, 0), "the day first"),
+        ("%d/%m/%y %H:%M:%S.%f", datetime(2021, 3, 12, 23, 59, 40), "the day first"),
     ],
 )
 def test_dates_whose_order_the_log_shows(tmp_path, form, start, said):

@@ -1,6 +1,7 @@
 """An error that all fixes share is in the position found: sigma has it where nobody says that there is none."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from truenorth.aiding.aids import Gnss
 from truenorth.aiding.sensors import from_gnss
 from truenorth.navigation import Mounting, navigate
 from truenorth.quality.absolute import accuracy_of, known_as_fixes, known_as_followed, shared_part
-from truenorth.quality.aid_noise import LEAST_SQUARE
+from truenorth.quality.aid_noise import LEAST_SQUARE, white_part
 from truenorth.quality.slow_aids import FIXES
 from truenorth.records import GnssRecord
 from truenorth.simulation.processes import gauss_markov
@@ -141,3 +142,19 @@ def test_nothing_is_known_of_what_is_shared():
         record = record if says else replace(record, position_sigma=None)
         known = known_as_fixes(track, record, None, fixes=fixes)
         assert known.sigma[-1, DP][:2] == pytest.approx(said)
+
+
+@pytest.mark.parametrize("newest", [3000, 1000])
+def test_what_good_fixes_share_is_not_what_poor_ones_after_them_share(newest):
+    """200 s of fixed phases, then 100 s that say 2 m and all err by 1.5 m. A loop keeps the newest rows, and older innovations."""
+    rng = np.random.default_rng(0)
+    time = 0.1 * np.arange(3000)
+    said = np.where(time < 200.0, 0.02, 2.0)[:, None] * np.ones(3)
+    expected = np.hypot(said, 0.03)
+    off = np.where(
+        time[:, None] < 200.0, expected * rng.standard_normal((3000, 3)), 1.5 + 0.05 * rng.standard_normal((3000, 3))
+    )
+    shown = SimpleNamespace(name=FIXES, used=np.ones(3000, dtype=bool), innovation=off, sigma=expected, stamp=time)
+    source = SimpleNamespace(name=FIXES, time=time[-newest:], sigma=said[-newest:])
+    part = white_part(SimpleNamespace(residuals=(shown,)), source, slice(0, 2))
+    assert shared_part(*part) > 0.9

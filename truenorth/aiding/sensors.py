@@ -131,7 +131,9 @@ def _of_own_clock(source: Aiding, mounting: Mounting) -> Aiding:
     """A receiver's velocities with the delay that is theirs alone."""
     own = mounting.of_velocities
     others = {key: group for key, group in source.states.items() if key != "lag"}  # that is of the places
-    states = others | _of_receiver(replace(mounting, latency_sigma=own.latency_sigma), source.name, "lag")
+    states = others | _of_receiver(
+        replace(mounting, latency_sigma=own.latency_sigma, drift=mounting.clock), source.name, "lag"
+    )
     return replace(source, time=source.time + mounting.latency - own.latency, states=states)
 
 

@@ -4,7 +4,7 @@ A vehicle that stands, and whose IMU is as quiet as at its other stops, may turn
 bias has changed since: by the warmth of an engine, or since another filter has corrected the rates before they were written. The
 biases of that filter move with its own innovations: those of a UAV of 2 kg (University of Minnesota, Thor, flight 75) by .8 deg/s
 while it taxied, and the heading after it was 20 deg off. Neither rate nor speed tells a change from a turn. So what a change would
-do to heading is counted: no more than as long as it may have lasted.
+do to heading is counted, from the last usual stop on. Between usual stops it was a turn.
 """
 
 from __future__ import annotations
@@ -48,8 +48,10 @@ def shift_evidence(task: MovingTask, track: Track) -> list[Evidence]:
         if len(steady) < FEWEST or len(steady) < 0.5 * len(rows) or not rest.size or size > most:
             continue
         first = float(at[rows[0]])
+        before, after = rest[rest < first], rest[rest > at[rows[-1]]]
+        if before.size and after.size:  # the usual rate is back: a turn, for no bias goes and comes back as it was
+            continue
         up = track.C_nb[min(int(np.searchsorted(track.time, first)), len(track) - 1), 2]
-        before = rest[rest < first]
         since = float(before[-1]) if before.size else float(at[rows[-1]])
         heading = min(abs(float(up @ rate)) * (end - since), math.pi)
         figures: dict[str, Figure] = {"time": first, "size": size, "seconds": len(rows), "heading": heading}

@@ -1,7 +1,7 @@
 """Dates of a log, in whatever order of day and month: ``11/03/2021`` is read by what the log itself shows.
 
 A number above 12 is a day. Where midnight passes, the number that goes up by one is the day. Else nobody knows, the month is taken
-to stand first, and what is returned says so.
+to stand first, and what is returned says so. A year of two digits is one of this century.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-YEAR_LAST = r"^(\d{1,2})([-/.])(\d{1,2})\2(\d{4})(?=\D|$)"
+YEAR_LAST = r"^(\d{1,2})([-/.])(\d{1,2})\2(\d{4}|\d{2})(?=\D|$)"
 MONTHS = 12
 UNKNOWN = "dates, the month first: no number of theirs shows that it is not the day; write ISO dates to be sure"
 
@@ -42,7 +42,8 @@ def dates_of(cells: pd.Series) -> tuple[Array, str]:
     day_first, what = _order(first, second, parts[1].iloc[0])
     day, month = (0, 2) if day_first else (2, 0)
     rest = cells.str.replace(YEAR_LAST, "", regex=True)
-    iso = parts[3] + "-" + parts[month].str.zfill(2) + "-" + parts[day].str.zfill(2) + rest
+    year = parts[3].where(parts[3].str.len() == 4, "20" + parts[3])
+    iso = year + "-" + parts[month].str.zfill(2) + "-" + parts[day].str.zfill(2) + rest
     return _seconds(iso), what
 
 

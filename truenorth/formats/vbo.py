@@ -84,6 +84,8 @@ def columns(path: Path) -> Columns:
                 values[:, k] /= 60.0 if name == "lat [deg]" else -60.0
             elif name in ("sats", "quality"):
                 values[:, k] = np.mod(values[:, k], ALL_SATS + 1.0)
+                if name == "quality":  # none, or one of which the file does not say how good it is
+                    values[:, k] = values[:, k] > 0.0
         return values
 
     def column(name: str) -> pa.ChunkedArray:
@@ -100,7 +102,7 @@ def columns(path: Path) -> Columns:
 def _table(path: Path) -> tuple[TextTable, list[str]]:
     """The rows below ``[data]``, and the lines above."""
     text, note = text_of(path)
-    lines = text[: 1 << 16].decode("latin-1").splitlines()
+    lines = [line.decode("latin-1") for line in text[: 1 << 16].splitlines()]  # of bytes: no other signs end a line
     start = next(k for k, line in enumerate(lines) if line.strip().casefold() == "[data]")
     above = lines[:start]
     names = " ".join(_section(above, "column names")).split()
@@ -122,7 +124,13 @@ def _names(theirs: Sequence[str], table: TextTable, lines: Sequence[str]) -> lis
     for name, label in zip(theirs, table.names):
         if name in OF_HEADER:
             found = next((m[1] for t in titles if (m := re.match(OF_HEADER[name], t.strip(), re.IGNORECASE))), SPEED)
-            names.append(f"{NAMES[name]} [{unit_in(found.strip('()[]')) or SPEED}]")
+            unit = unit_in(found.strip("()[]"))
+            if unit is None:
+                raise DataError(
+                    f"{table.path.name}: [header]: {name} in {found}; expected a unit of speed, such as kmh, m/s, mph or knots: "
+                    "export the file in one of them"
+                )
+            names.append(f"{NAMES[name]} [{unit}]")
         else:
             names.append(
                 NAMES.get(name)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.aids import Gnss
 from truenorth.aiding.sensors import place_axes, place_sigma
 from truenorth.aiding.source import Aiding
-from truenorth.quality.aid_noise import white_part
+from truenorth.quality.aid_noise import NEWEST, white_part
 from truenorth.quality.slow_aids import FIXES, Lasting, as_lasting, says_size, slow_errors, usual_bias, with_slow
 from truenorth.quality.swing import UNSEEN_ARM
 from truenorth.records import GnssRecord
@@ -62,14 +62,16 @@ def known_as_fixes(
 ) -> Track:
     """The track with position known no better than by a fix of this receiver; `bias`: what was said of its slow error.
 
-    Of heights, too, where the receiver has them. What the receiver says of a fix is noise, what wanders and what stays,
-    together. Innovations have shown the noise and what wanders (`shown`), or that nothing does and how large the noise of `fixes`
-    is; both are in the track's covariance: only the rest can stay. A receiver that says far less than innovations show, or nothing,
-    says nothing of the rest: there position is known no better than its slow error, which may last longer than the log.
+    Of heights, too, where the receiver has them. What the receiver says of a fix is noise, what wanders and what stays, together,
+    and of the last ones where those are worse. Innovations have shown the noise and what wanders (`shown`), or that nothing does
+    and how large the noise of `fixes` is; both are in the track's covariance: only the rest can stay. A receiver that says far less
+    than innovations show, or nothing, says nothing of the rest: there position is known no better than its slow error, which may
+    last longer than the log.
     """
     if bias is not None or record is None or not record.has_position.any() or not len(track.P):
         return track
-    sigma = accuracy_of(record)
+    last = record.between(float(record.time[-NEWEST:][0]), None)
+    sigma = np.maximum(accuracy_of(record), accuracy_of(last) if last.has_position.any() else 0.0)
     if not np.isfinite(record.alt[record.has_position]).any():
         sigma[2] = 0.0
     P, at = track.P.copy(), np.arange(DP.start, DP.stop)

@@ -35,6 +35,8 @@ WHEEL, WHEELS = "odometer", {0.95: 3.8415}
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
 STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
 LEAST_SQUARE = 0.05  # in parts of the variance: of differences that are expected to be nothing the scatter is no less
+NEWEST, ALIKE = 30, 2.0  # rows, and times as large a sigma: measurements that are as good as the last
+SAME = 1e-3  # s, by which stamps of one row may differ
 LOUD = 3.0  # times its sigma, that an aid is so noisy that what a first pass found is made of noise
 
 
@@ -108,14 +110,18 @@ def _factors(residuals: Residuals, source: Aiding, least: Array, tails: bool) ->
 
 
 def _said(residuals: Residuals, source: Aiding) -> Array:
-    """(M, 3) what a source says of the measurements of these residuals, variances."""
+    """(M, 3) what a source says of the measurements of these residuals, variances; NaN of those that it does not have any more."""
     order = np.argsort(source.time, kind="stable")
     row = order[np.clip(np.searchsorted(source.time[order], residuals.stamp), 0, len(order) - 1)]
-    return source.sigma[row] ** 2
+    said = source.sigma[row] ** 2
+    said[residuals.stamp < source.time.min() - SAME] = np.nan
+    return said
 
 
 def white_part(track: Track, source: Aiding, axes: slice) -> tuple[float, float] | None:
     """White noise of some components of a source, in parts of the variance that it says, and one sigma of that part.
+
+    Of measurements that are said to be about as good as the last ones.
 
     Of differences of innovations that follow each other, ``E d^2 = (S_1 + S_2) + (q - 1)(R_1 + R_2)`` where noise has the variance
     ``q R``: a regression on R. Such squares share a row with the next, and are correlated by a fourth: three in place of two.
@@ -140,7 +146,11 @@ def white_part(track: Track, source: Aiding, axes: slice) -> tuple[float, float]
     e, S, R = residuals.innovation[used, axes], residuals.sigma[used, axes] ** 2, _said(residuals, source)[used, axes]
     both, said = S[1:] + S[:-1], R[1:] + R[:-1]
     squares, share = np.diff(e, axis=0) ** 2 / both - 1.0, said / both
-    there = np.isfinite(squares) & np.isfinite(share)
+    near = np.nanmedian(R[-NEWEST:], axis=0) if len(R) else np.full(R.shape[1], np.nan)
+    alike = np.abs(np.log(R / near)) < 2.0 * math.log(
+        ALIKE
+    )  # how good the last ones are, worse or better ones do not say
+    there = np.isfinite(squares) & np.isfinite(share) & alike[1:] & alike[:-1]
     if int(there.sum()) < FEWEST or not (weight := float(np.sum(share[there] ** 2))) > 0.0:
         return None
     part = 1.0 + float(np.sum((squares * share)[there])) / weight

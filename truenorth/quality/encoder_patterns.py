@@ -146,4 +146,4 @@ def own_share(pattern: Array, others: Array) -> float:
     """The largest part of the energy of patterns (K, 3, n), whatever their sum, that others (K, 3, m) do not make."""
     P, L = pattern.reshape(-1, pattern.shape[2]), others.reshape(-1, others.shape[2])
     left = P - L @ np.linalg.lstsq(L, P, rcond=1e-9)[0]
-    return float(np.max(np.linalg.eigvals(np.linalg.solve(P.T @ P, left.T @ left)).real))
+    return float(np.max(np.linalg.eigvals(np.linalg.pinv(P.T @ P) @ (left.T @ left)).real))
