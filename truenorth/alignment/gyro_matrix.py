@@ -103,16 +103,24 @@ def gyro_matrix_evidence(
     in_doubt = found.pushed > limit("pushed in step") * gained or late > limit("may be pushed") * gained
     if in_doubt and np.abs(found.M).max() > OPEN[-1]:  # no gyro, but what waves do is as large as that
         return []
-    moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, found.fine))))
     key, figures = _named(found.M, found.sigma)
     figures["ratio"] = gained
+    effect = _effect(fine, found)
+    if effect is None:
+        return []
+    in_doubt = in_doubt or float(np.abs(found.M).max()) < EXACT
+    return [Evidence(key, figures, "hint" if in_doubt else "bounded", effect, ("imu_axes", "units"))]
+
+
+def _effect(fine: SwayAlignment, found: _Found) -> Effect | None:
+    """What a matrix does to level and heading; None: nothing that counts."""
+    moved = np.abs(misalignment(*(item.misalignment_at(np.eye(3), 0.0)[0] for item in (fine, found.fine))))
+    key, figures = _named(found.M, found.sigma)
     turned = key == "tilt.turned" and float(figures["turn"]) > SHOWN * float(figures["sigma"])
     askew = _askew(fine, found.M) if turned else 0.0
     if not np.any(np.append(moved, askew) > limit("negligible") * np.sqrt(np.diag(fine.P)[PHI])[[0, 1, 2, 0]]):
-        return []
-    effect = Effect(heading=float(moved[2]), level=math.hypot(moved[0], moved[1], askew))
-    in_doubt = in_doubt or float(np.abs(found.M).max()) < EXACT
-    return [Evidence(key, figures, "hint" if in_doubt else "bounded", effect, ("imu_axes", "units"))]
+        return None
+    return Effect(heading=float(moved[2]), level=math.hypot(moved[0], moved[1], askew))
 
 
 def _askew(fine: SwayAlignment, M: Array) -> float:
@@ -185,12 +193,15 @@ def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, fine: SwayAlignment,
     Each round tries, from the best so far, a matrix that is left a little open and one that is wide open, and a step to what the
     filter's innovations show. A motion of the base takes a part of a matrix up: left open it may come to rest where the log is less
     likely than as given; the steps go on with a motion that is fitted to each, and are too short. Where a push explains more
-    than the first matrices do, it is none. A round that makes the log likelier by no more than chance is the last.
+    than the first matrices do, it is none, and where both of them do nothing to the answer no other is sought. A round that makes
+    the log likelier by no more than chance is the last.
     """
     best, as_given = _Found(np.zeros((3, 3)), np.zeros((3, 3)), fine, np.inf), likelihood(fine)
     for turn in range(ROUNDS):
         found = _left_open(record, best, _opened(imu, OPEN[0]), anew, seen), _stepped(record, best, anew, seen)
         better = max(best, *found, key=_likelihood)
+        if turn == 0 and not any(_effect(fine, item) for item in found):
+            break  # both ways to it find a matrix that does nothing
         if turn == 0 and better.pushed <= _likelihood(better) - as_given:
             as_given = max(as_given, likelihood(anew(record)))  # a motion that is fitted anew may be likelier by itself
         if better.pushed > _likelihood(better) - as_given:
