@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
 LONG_ARM = (
-    2.0  # sigmas of its prior, from which an arm that nobody has said shows a larger vehicle, a rate a poorer clock
+    2.0  # sigmas of a prior, from which an arm that nobody has said shows a larger vehicle, a rate a poorer clock
 )
 WIDER = 10.0  # times the prior of such a rate: quartz, ceramic resonators, oscillators of a chip without either
 WORST_CLOCK = 1e-2

@@ -55,9 +55,7 @@ class Plan:
     every: int
     slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
     factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
-    swings: bool = (
-        False  # the receiver's velocities do not show all of the swing of its antenna, which sits at a known place
-    )
+    swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
     unseen: float = 0.0  # share of that swing which is in their noise
     scattered: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
 

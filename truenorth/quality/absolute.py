@@ -93,7 +93,7 @@ def _left(track: Track, record: GnssRecord, shown: Lasting | None, fixes: Aiding
         return np.full(3, max(1.0 - seen**2, 0.0)) if says_size(record) and seen < limit("fix untrue") else None
     if (
         fixes is None or record.position_sigma is None
-    ):  # a dilution of precision says nothing of the size of a range's error
+    ):  # a dilution of precision says nothing of how large a range's error is
         return None
     level, up = (white_part(track, fixes, axes) for axes in (LEVEL, UP))
     if level is None or not level[0] < limit("fix untrue") ** 2:

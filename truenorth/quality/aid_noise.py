@@ -146,10 +146,13 @@ def white_part(track: Track, source: Aiding, axes: slice) -> tuple[float, float]
     e, S, R = residuals.innovation[used, axes], residuals.sigma[used, axes] ** 2, _said(residuals, source)[used, axes]
     both, said = S[1:] + S[:-1], R[1:] + R[:-1]
     squares, share = np.diff(e, axis=0) ** 2 / both - 1.0, said / both
-    near = np.nanmedian(R[-NEWEST:], axis=0) if len(R) else np.full(R.shape[1], np.nan)
-    alike = np.abs(np.log(R / near)) < 2.0 * math.log(
-        ALIKE
-    )  # how good the last ones are, worse or better ones do not say
+    known = R[np.all(R > 0.0, axis=1)]
+    if not len(known):
+        return None
+    # How good the last ones are: better or worse ones do not say what these share.
+    near = np.median(known[-NEWEST:], axis=0)
+    low, high = near / ALIKE**2, near * ALIKE**2
+    alike = (low < R) & (R < high)
     there = np.isfinite(squares) & np.isfinite(share) & alike[1:] & alike[:-1]
     if int(there.sum()) < FEWEST or not (weight := float(np.sum(share[there] ** 2))) > 0.0:
         return None
