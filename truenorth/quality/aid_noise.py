@@ -152,7 +152,7 @@ def white_part(track: Track, source: Aiding, axes: slice) -> tuple[float, float]
     # How good the last ones are: better or worse ones do not say what these share.
     near = np.median(known[-NEWEST:], axis=0)
     low, high = near / ALIKE**2, near * ALIKE**2
-    alike = (low < R) & (R < high)
+    alike = (low < R) & (high > R)
     there = np.isfinite(squares) & np.isfinite(share) & alike[1:] & alike[:-1]
     if int(there.sum()) < FEWEST or not (weight := float(np.sum(share[there] ** 2))) > 0.0:
         return None
