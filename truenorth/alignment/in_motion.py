@@ -44,6 +44,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.latency import rate_evidence
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
+from truenorth.estimate.other_clocks import best_clock
 from truenorth.estimate.poorer import ALONE, BIASES, poorer_evidence, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, jump_evidence, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
@@ -192,6 +193,7 @@ def _aligned(
     if any(float(factor.max()) > LOUD for factor in louder.values()):  # what it found was made of noise
         task = replace(task, factors=louder)
         found, spread = _begun(task, method, tell)
+    task, found, unsure = _on_another_clock(task, found)
     first, bank, number, much = found.guess, spread, 1, False
     while number < passes or ((much or not found.settled) and passes > 1 and number < passes + MORE_PASSES):
         task, much = task.learnt(found.track)
@@ -228,8 +230,8 @@ def _aligned(
     more += [note("aids.late", waited=task.waited)] if task.waited else []
     if (of := answer.moving) is not None:
         more += learnt_evidence(task.factors, of.delays, task.scatter, task.swings)
-        more += rate_evidence(of.clocks, of.track)
-    more += task.wanders
+        more += rate_evidence(of.clocks, of.track, task.record)
+    more += [*task.wanders, *unsure]
     more += _seen(task, track, guess, first, gated=passes > 1, gyrocompassed=method == "gyrocompass")
     return judge_moving(answer, last or track, heading_limit, more)
 
@@ -246,6 +248,19 @@ def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[
     guesses = guesses_all_round(task.record, task.odometer, task.gnss, task.wheel, task.antenna)
     best, track, spread = _best_of_bank(task, guesses, tell)
     return begun(task, guesses[best], track), spread
+
+
+def _on_another_clock(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, list[Evidence]]:
+    """Task and first pass on a receiver's clock that runs far apart from the IMU's, where the log says so; else the same."""
+
+    def run(antenna: Mounting) -> Track:
+        return replace(task, antenna=antenna).run(found.guess, gated=False)
+
+    best, unsure = (None, []) if task.gnss is None else best_clock(run, task.antenna, found.track)
+    if best is None:
+        return task, found, unsure
+    apart = replace(task, antenna=best.antenna)
+    return apart, begun(apart, found.guess, best.track), unsure
 
 
 def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:

@@ -13,21 +13,19 @@ from truenorth.alignment.in_motion_passes import begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.latency import SHOWN_DELAY, as_it_runs, counted_from, delay_of
+from truenorth.estimate.latency import SHOWN_DELAY, as_it_runs, as_stamped, counted_from, delay_of
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
-from truenorth.quality.swing import VELOCITIES
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.state.evidence import Effect, Evidence, Kind
 from truenorth.state.limits import limit, may_be_chance
 from truenorth.state.mounting import Mounting
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
 MORE_PASSES = 4  # of a log whose clocks are left open
-CLOCK_DIGITS = 6  # of a stamp, s
 
 
 def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool) -> list[Evidence]:
@@ -108,24 +106,14 @@ def _of_open_clocks(task: MovingTask, guess: Guess, track: Track, first: Guess, 
             if not much and found.settled:
                 break
         shut = replace(anew, antenna=task.antenna, wheel=task.wheel)
-        both = (_as_stamped(tried, tried.run(found.guess, gated=False)) for tried in (shut, anew))
+        both = (
+            as_stamped(tried.run(found.guess, gated=False).residuals, tried.antenna, tried.wheel)
+            for tried in (shut, anew)
+        )
         ratio = likelihood_ratio(*both)
     except DataError:  # the filter broke down: what was found before stands
         return usual
     return _Opened(anew, found.guess, found.track, ratio) if ratio > usual.ratio else usual
-
-
-def _as_stamped(task: MovingTask, track: Track) -> list[Residuals]:
-    """Residuals with the stamps of their logs, which the latency of a sensor has moved."""
-    antenna, wheel = task.antenna, task.wheel
-    own = replace(antenna, latency=antenna.of_velocities.latency)
-    sensors = {"GNSS position": antenna, VELOCITIES: own, "odometer": wheel, "velocity log": wheel}
-
-    def stamps(r: Residuals) -> Array:
-        at = sensors[r.name].stamped(r.stamp) if r.name in sensors else r.stamp
-        return np.round(at, CLOCK_DIGITS)
-
-    return [replace(r, stamp=stamps(r)) for r in track.residuals]
 
 
 def _opened(mounting: Mounting) -> Mounting:

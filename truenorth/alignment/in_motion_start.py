@@ -145,7 +145,7 @@ def start_at(
 def _by_gnss(gnss: GnssRecord, antenna: Mounting, time: float, end: float) -> tuple[Array, float]:
     """Velocity (3,) at a time by a receiver, m/s, and one sigma of it: what delays and differences of places do counts."""
     at = np.array([time, time + max(antenna.latency_sigma, 1e-3), end])
-    v = gnss_track(gnss, at, antenna.late_at(time))[0]
+    v = gnss_track(gnss, at, antenna)[0]
     change = float(np.linalg.norm(v[1] - v[0]))
     fixes = gnss.time[gnss.has_position]
     by_places = 0.0
@@ -165,7 +165,7 @@ def _swing(record: ImuRecord, antenna: Mounting) -> float:
 def _velocity_b(log: OdometerRecord | VelocityRecord, mounting: Mounting, at: Array) -> Array:
     """(M, 3) velocity in body axes at these times, m/s."""
     v = log.velocity_b(mounting.C_mb)
-    return np.stack([np.interp(at, log.time - mounting.latency, v[:, i]) for i in range(3)], axis=1)
+    return np.stack([np.interp(at, log.time - mounting.late_at(log.time), v[:, i]) for i in range(3)], axis=1)
 
 
 def led_back(track: Track, back: Array, spec: ImuSpec, first: Guess) -> Guess:

@@ -100,8 +100,8 @@ def odometer_alignment(
 def gnss_alignment(record: ImuRecord, gnss: GnssRecord, mounting: Mounting | None = None) -> MovingAttitude:
     """Attitude at the start of a log, from inertial sensors and a GNSS receiver; from any heading.
 
-    Velocities where the receiver has them, else differences of positions. Of the antenna's mounting the latency counts; its lever
-    arm, against unknown attitude, is of no use yet.
+    Velocities where the receiver has them, else differences of positions. Of the antenna's mounting the latency counts, and how
+    it grows; its lever arm, against unknown attitude, is of no use yet.
 
     Raises
     ------
@@ -109,9 +109,8 @@ def gnss_alignment(record: ImuRecord, gnss: GnssRecord, mounting: Mounting | Non
         Fewer than five fixes in the log.
     """
     integrals = integrate(record, INTERVAL)
-    latency = 0.0 if mounting is None else mounting.latency
     at = integrals.start + integrals.time
-    velocity, place = gnss_track(gnss, at, latency)
+    velocity, place = gnss_track(gnss, at, mounting)
     T = integrals.intervals
     C_n0_n = frames(integrals.time, place)
     v_n0 = np.einsum("kij,kj->ki", C_n0_n, velocity)
@@ -121,15 +120,18 @@ def gnss_alignment(record: ImuRecord, gnss: GnssRecord, mounting: Mounting | Non
     return _solve(integrals.time, integrals.mean_velocity, r, "velocity", place, FIRST)
 
 
-def gnss_track(gnss: GnssRecord, at: Array, latency: float = 0.0) -> tuple[Array, Array]:
+def gnss_track(gnss: GnssRecord, at: Array, mounting: Mounting | None = None) -> tuple[Array, Array]:
     """Velocity (K, 3), m/s, and position (K, 3) of the antenna at some times, between its fixes by straight lines.
+
+    By the IMU's clock, as late as the antenna's mounting says, and in its seconds.
 
     Raises
     ------
     DataError
         Fewer than five fixes within these times.
     """
-    time = gnss.time - latency
+    mounting = mounting or Mounting()
+    time = gnss.time - mounting.late_at(gnss.time)
     fixed = gnss.has_position
     inside = fixed & (time >= at[0] - 1.0) & (time <= at[-1] + 1.0)
     if inside.sum() < LEAST_FIXES:
@@ -141,7 +143,7 @@ def gnss_track(gnss: GnssRecord, at: Array, latency: float = 0.0) -> tuple[Array
     place = np.stack([np.interp(at, time[fixed], a[fixed]) for a in (gnss.lat, gnss.lon, height)], axis=1)
     known = gnss.has_velocity
     if gnss.v_n is not None and known.sum() >= LEAST_FIXES:
-        v, when = np.nan_to_num(gnss.v_n[known]), time[known]
+        v, when = np.nan_to_num(gnss.v_n[known]) / (1.0 - mounting.clock.rate), time[known]
     else:
         t, lat, lon, alt = time[fixed], gnss.lat[fixed], gnss.lon[fixed], height[fixed]
         R_M, R_N = radii(lat[:-1])
@@ -169,7 +171,7 @@ def _wheel_displacement(
     record: ImuRecord, odometer: OdometerRecord | VelocityRecord, mounting: Mounting, integrals: InertialIntegrals
 ) -> Array:
     """(K+1, 3) how far the IMU went in i since the start, by the wheel, m, at the ends of the intervals."""
-    ends = odometer.time - mounting.latency
+    ends = odometer.time - mounting.late_at(odometer.time)
     starts = ends - odometer.steps
     at = integrals.start + integrals.time
     if starts[0] > at[0] + 2.0 or ends[-1] < at[-1] - 2.0:

@@ -9,13 +9,15 @@ which nobody spoke have many sizes, delays have few: where an arm is found beyon
 taken what it could not hold. The next pass then has a wider arm, and the delay as it was.
 
 The clocks of a receiver and an IMU run at two rates: of quartz, 10 to 100 ppm apart, .04 to .4 s in an hour. So the delay of a
-receiver has a rate, which is a state too, and a pass begins with the rate that the one before has found. A rate that is found
-beyond its prior is that of a poorer clock, and the next pass has a wider prior, as of an arm.
+receiver has a rate, which is a state too, and a pass begins with the rate that the one before has found. What a log moves a sound
+rate by has the variance ``s0^2 - s^2`` of its prior s0 and its sigma s, however little it shows. A rate that is moved by more is
+that of a poorer clock, and the next pass has a wider prior.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -24,19 +26,21 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.quality.swing import VELOCITIES
+from truenorth.records import ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.limits import is_estimated
 from truenorth.state.mounting import LONGEST_ARM, Mounting
-from truenorth.state.track import Track
+from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
 LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
-LONG_ARM = (
-    2.0  # sigmas of a prior, from which an arm that nobody has said shows a larger vehicle, a rate a poorer clock
-)
+LONG_ARM = 2.0  # sigmas of a prior, from which an arm that nobody has said shows a larger vehicle
 WIDER = 10.0  # times the prior of such a rate: quartz, ceramic resonators, oscillators of a chip without either
 WORST_CLOCK = 1e-2
+CLOCK_DIGITS = 6  # of a stamp, s
+WEAK = 0.3  # of a prior, below which it has a tenth of the say
+SETTLED = 0.3  # of its sigma, by which a rate that is apart may still move
 SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word, or a pass
 SAID_DELAY = 0.02  # s, from which it is worth a word
 
@@ -67,12 +71,10 @@ def best_rate(track: Track) -> tuple[float, float, float] | None:
 
 def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
     """The mounting of a sensor with the delay that a track has found; the same object where that is too short to matter."""
-    rate = best_rate(track) if name == "GNSS" else None
-    if rate is not None and abs(rate[0]) > LONG_ARM * rate[2] and rate[2] < WORST_CLOCK:
-        return replace(mounting, drift=mounting.clock._replace(rate_sigma=min(WIDER * rate[2], WORST_CLOCK)))
-    grown = 0.0 if rate is None else rate[0] * float(track.time[-1] - track.time[0])
-    if rate is not None and abs(grown) > LEAST_DELAY and abs(rate[0]) > SHOWN_DELAY * rate[1]:
-        return as_it_runs(mounting, track)
+    if name == "GNSS" and (rate := best_rate(track)) is not None:
+        running = _running_as_found(mounting, track, rate)
+        if running is not mounting:
+            return running
     later = _more(track, name)
     if later != 0.0:
         mounting = replace(mounting, latency=mounting.latency + later)
@@ -80,6 +82,38 @@ def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
         own = mounting.velocities
         mounting = replace(mounting, velocities=own._replace(latency=own.latency + later))
     return mounting
+
+
+def _running_as_found(mounting: Mounting, track: Track, rate: tuple[float, float, float]) -> Mounting:
+    """The mounting of a receiver whose clock runs as a track has found it (rate, sigma, prior), or may run further apart."""
+    value, sigma, prior = rate
+    if _beyond_its_prior(rate) and prior < WORST_CLOCK:
+        return replace(mounting, drift=mounting.clock._replace(rate_sigma=min(WIDER * prior, WORST_CLOCK)))
+    begin, end = float(track.time[0]), float(track.time[-1])
+    if abs(value) * (end - begin) <= LEAST_DELAY:
+        return mounting
+    if abs(value) > SHOWN_DELAY * sigma:
+        return as_it_runs(mounting, track)
+    apart = mounting.clock.rate != 0.0 and sigma < WEAK * prior
+    return _at_another_rate(mounting, value, begin) if apart and abs(value) > SETTLED * sigma else mounting
+
+
+def _beyond_its_prior(rate: tuple[float, float, float]) -> bool:
+    """Whether a log moves a rate (its value, sigma and prior) by more than chance explains."""
+    return abs(rate[0]) > SHOWN_DELAY * math.sqrt(max(rate[2] ** 2 - rate[1] ** 2, 0.0))
+
+
+def _at_another_rate(mounting: Mounting, rate: float, begin: float) -> Mounting:
+    """The mounting of a receiver whose clock runs apart by more, as late as it was said to be when the log begins.
+
+    Measurements are nearer to linear about it, and what is known of the delay itself still counts once.
+    """
+    grown = mounting.late_at(begin) - mounting.latency
+    own = mounting.velocities
+    if own is not None:
+        own = own._replace(latency=own.latency + grown)
+    drift = mounting.clock._replace(rate=mounting.clock.rate + rate, since=begin)
+    return replace(mounting, latency=mounting.latency + grown, velocities=own, drift=drift)
 
 
 def as_it_runs(mounting: Mounting, track: Track) -> Mounting:
@@ -118,6 +152,20 @@ def mounting_found(mounting: Mounting, track: Track, name: str) -> Mounting:
     return longer if longer is not mounting else as_late_as_found(mounting, track, name)
 
 
+def as_stamped(residuals: Iterable[Residuals], antenna: Mounting, wheel: Mounting | None = None) -> list[Residuals]:
+    """Residuals with the stamps of their logs, which the latency of a sensor has moved."""
+    own = replace(antenna, latency=antenna.of_velocities.latency)
+    sensors = {"GNSS position": antenna, VELOCITIES: own}
+    if wheel is not None:
+        sensors |= {"odometer": wheel, "velocity log": wheel}
+
+    def stamps(r: Residuals) -> Array:
+        at = sensors[r.name].stamped(r.stamp) if r.name in sensors else r.stamp
+        return np.round(at, CLOCK_DIGITS)
+
+    return [replace(r, stamp=stamps(r)) for r in residuals]
+
+
 def latencies(name: str, mounting: Mounting, time: Any) -> dict[str, Any]:
     """How late a sensor is said to be at a time, s, by the names of its delays; a receiver's velocities may have their own."""
     late = mounting.late_at(time)
@@ -144,15 +192,20 @@ def rates_found(track: Track, antenna: Mounting) -> dict[str, tuple[float, float
     }
 
 
-def rate_evidence(rates: Mapping[str, tuple[float, float]], track: Track) -> list[Evidence]:
-    """That a receiver's clock and the IMU's run apart: delays are in sigma, velocities are metres in a second of the IMU's."""
+def rate_evidence(rates: Mapping[str, tuple[float, float]], track: Track, record: ImuRecord) -> list[Evidence]:
+    """That a receiver's clock and the IMU's run apart: delays are in sigma, velocities are metres in a second of the IMU's.
+
+    Gyros that say rates say angles by seconds of the IMU, too: of a turn a part as large is missing.
+    """
     best = min(rates.values(), key=lambda rate: rate[1], default=(0.0, 0.0))
     if abs(best[0]) <= SHOWN_DELAY * best[1]:
         return []
     key = "clock.runs_fast" if best[0] < 0.0 else "clock.runs_slow"
     dv = abs(best[0]) * float(np.linalg.norm(track.v_n, axis=1).max())
+    headings = np.unwrap(np.arctan2(track.C_nb[:, 0, 1], track.C_nb[:, 1, 1]))
+    turned = float(np.ptp(headings)) if record.kind == "rates" else 0.0
     figures: dict[str, Figure] = {"name": "GNSS", "size": 1e6 * abs(best[0]), "sigma": 1e6 * best[1]}
-    return [Evidence(key, figures, kind="hint", effect=Effect(velocity=dv))]
+    return [Evidence(key, figures, kind="hint", effect=Effect(heading=abs(best[0]) * turned, velocity=dv))]
 
 
 def delay_notes(delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:

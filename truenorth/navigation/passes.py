@@ -16,6 +16,7 @@ from truenorth.core.errors import DataError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
 from truenorth.estimate.moments import explained_by_two, velocities_apart
+from truenorth.estimate.other_clocks import best_clock
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
 from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
@@ -29,6 +30,7 @@ from truenorth.quality.swing import shown_arm, swing, unseen_swing, with_unseen_
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
+from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -92,6 +94,8 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     plan, track = _not_lost(plan, given, track, smooth)
     plan, track = _as_noisy(plan, given, track, smooth)
     said += noise_notes(plan.factors)
+    given, track, unsure = _on_another_clock(plan, given, track, smooth)
+    said += unsure
     later = delayed(plan, given, track)
     if later is not given:
         given = later
@@ -123,7 +127,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
         if receiver.mounting is not None:
-            said += rate_evidence(rates_found(track, receiver.mounting), track)
+            said += rate_evidence(rates_found(track, receiver.mounting), track, plan.record)
     for key, (name, _) in SENSORS.items():
         if given.get(key) is asked.get(key):
             continue
@@ -220,6 +224,23 @@ def _with_swing(plan: Plan, given: dict[str, Any], track: Track, arm: Array, sha
     fixes = [source for source in plan.sources(given) if source.name == SPEEDS]
     added = {source.name: share * swing(track, plan.record, arm, source.time) for source in fixes}
     return replace(plan, unseen=share, scattered=added)
+
+
+def _on_another_clock(
+    plan: Plan, given: dict[str, Any], track: Track, smooth: bool
+) -> tuple[dict[str, Any], Track, list[Evidence]]:
+    """The aids and their track on a receiver's clock that runs far apart from the IMU's, where the log says so; else the same."""
+    receiver = given.get(Gnss.key)
+    if not isinstance(receiver, Gnss) or receiver.mounting is None:
+        return given, track, []
+
+    def run(antenna: Mounting) -> Track:
+        return plan.run(plan.sources({**given, Gnss.key: receiver.mounted(antenna)}), smooth=smooth)
+
+    best, unsure = best_clock(run, receiver.mounting, track)
+    if best is None:
+        return given, track, unsure
+    return {**given, Gnss.key: receiver.mounted(best.antenna)}, best.track, unsure
 
 
 def _of_two_moments(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[dict[str, Any], Track]:

@@ -160,6 +160,10 @@ SENTENCES = {
         "the IMU's clock runs slow against that of the {name} by {size:.0f} ± {sigma:.2g} ppm: delays change so, "
         "which is estimated and in sigma"
     ),
+    "clock.may_run": (
+        "the clocks of the IMU and the {name} may run apart by {size:.0f} ppm: the log neither shows nor rules this out "
+        "(likelihood ratio {ratio:.3g}), and what it would do is in sigma by its chance: log more turns, or a longer log"
+    ),
     "gnss.delay_taken_over": "GNSS: its stamps are late as the alignment found, and that is estimated on",
     "odometer.taken_over": "odometer: scale, mounting and wheel arm are the alignment's, and estimated on",
     "odometer.scale": "the {name} counts {scale:%|+.2f} % ({sigma:%|.2g} % one sigma)",
