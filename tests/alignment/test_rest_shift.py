@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 import truenorth as tn
-from truenorth.alignment.in_motion_task import moving_task
+from tests.runs import some
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.navigation.stops import turned_in_stops
+from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
+from truenorth.state.state import Start
 
 SHIFT = np.radians([0.0, 0.1, 0.5])  # rad/s, of a UAV whose engine starts, or of rates that a filter has corrected
 WHEN = 80.0  # s: the van drives
@@ -62,5 +64,19 @@ def test_a_turn_on_the_spot_between_stops_is_no_change():
         record, gyro=record.gyro + (turning * record.steps[:, None] if record.kind == "increments" else turning)
     )
     assert turned_in_stops(turned, None, gnss)[0].size >= 5
-    task = moving_task(turned, "consumer", None, gnss, None, None, None, (), True, None, 0.0)
-    assert shift_evidence(task, SimpleNamespace(time=record.time[[-1]], C_nb=np.eye(3)[None])) == []
+    track = SimpleNamespace(time=record.time[[-1]], C_nb=np.eye(3)[None])
+    assert shift_evidence(turned, imu_spec("consumer"), track, None, gnss) == []
+
+
+@pytest.mark.parametrize("seed", some([0], [1]))
+def test_navigation_says_so_too(seed):
+    """It took such a change for the bias it had begun with, and did not look."""
+    log, gnss = van(seed)
+    spec, at = imu_spec("consumer"), log.motion.states(np.array([0.0]))
+    sigma = np.repeat([np.radians(1.0), 0.05, 3.0, spec.gyro_bias, spec.accel_bias], 3)
+    zero = np.zeros(3)
+    place = float(at.lat[0]), float(at.lon[0]), float(at.alt[0])
+    start = Start(0.0, at.C_nb[0], at.v_n[0], *place, zero, zero, np.diag(sigma**2))
+    for record, is_said in ((log.record, False), (shifted(log.record), True)):
+        result = tn.navigate(record, start, aid=tn.Gnss(gnss), imu=spec, check_clocks=False)
+        assert ("rest.shifts" in {item.key for item in result.evidence}) == is_said

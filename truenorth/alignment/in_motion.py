@@ -293,7 +293,8 @@ def _seen(
 ) -> list[Evidence]:
     """What the receiver, the log itself, the earth's rate at rest and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
-    found += moving_evidence(task.record) + shift_evidence(task, track)
+    found += moving_evidence(task.record)
+    found += shift_evidence(task.record, task.spec, track, task.odometer, task.gnss)
     if gyrocompassed:
         found += [*rest_evidence(task, track), *led_at_rest_evidence(task, track)]
         found += half_turn_evidence(task, track, gated=gated)

@@ -13,8 +13,9 @@ import math
 
 import numpy as np
 
-from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.navigation.stops import seconds_at_rest, turned_in_stops
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.track import Track
 
@@ -24,23 +25,28 @@ ONE_STOP = 15.0  # s between such seconds: of those in between a noisy receiver 
 LIKELY = 4.0  # sigmas of a gyro's bias, by which two of its values may differ: a faster rate is a turn
 
 
-def shift_evidence(task: MovingTask, track: Track) -> list[Evidence]:
+def shift_evidence(
+    record: ImuRecord, spec: ImuSpec, track: Track, *logs: OdometerRecord | GnssRecord | VelocityRecord | None
+) -> list[Evidence]:
     """Stops of another rate, and how far a change of biases between stops turns the heading at the end of a log.
 
     Parameters
     ----------
-    task : MovingTask
+    record : ImuRecord
+    spec : ImuSpec
+        Of the IMU: its biases are the measure of a change.
     track : Track
         Of the log: it says which axis is up.
+    *logs : records
+        That show when it stands: of a wheel, a receiver, a velocity log, in this order.
     """
-    logs = task.odometer, task.gnss
-    at, off = turned_in_stops(task.record, *logs)
+    at, off = turned_in_stops(record, *logs) if any(log is not None for log in logs) else (np.empty(0), np.empty(0))
     if not at.size:
         return []
-    rest = np.sort(np.concatenate(seconds_at_rest(task.record, *logs)))
+    rest = np.sort(np.concatenate(seconds_at_rest(record, *logs)))  # type: ignore[arg-type]  # in its order
     end = float(track.time[-1])
     found: list[Evidence] = []
-    most = LIKELY * math.sqrt(2.0) * float(np.sqrt(task.spec.bias_variance[:3]).max())
+    most = LIKELY * math.sqrt(2.0) * float(np.sqrt(spec.bias_variance[:3]).max())
     for rows in np.split(np.arange(len(at)), np.flatnonzero(np.diff(at) > ONE_STOP) + 1):
         rate = np.median(off[rows], axis=0)
         size = float(np.linalg.norm(rate))

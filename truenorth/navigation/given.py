@@ -105,6 +105,12 @@ def record_of(given: Mapping[str, Aid], kind: type[Any]) -> Any:
     return next((a.record for a in given.values() if isinstance(a, kind)), None)
 
 
+def logs_of_speed(given: Mapping[str, Aid]) -> tuple[Any, Any, Any]:
+    """Records that show when a vehicle stands: of its wheel, its receiver, its velocity log; None where there is none."""
+    wheel, receiver, log = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
+    return wheel, receiver, log
+
+
 def mounted_as(given: Mapping[str, Any], mountings: Mapping[str, Mounting]) -> dict[str, Any]:
     """The aids with other mountings."""
     return {key: a.mounted(mountings[key]) if isinstance(a, AIDS) else a for key, a in given.items()}

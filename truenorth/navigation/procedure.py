@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
@@ -34,6 +35,7 @@ from truenorth.navigation.given import (
     kept_altitude,
     kind_of_log,
     late_rows,
+    logs_of_speed,
     looked_at,
     mounted_as,
     record_of,
@@ -212,12 +214,11 @@ def _by_specification(
     check_places(given, begin, height)
     if zupt is not None:
         tell("looking for stops")
-        logs = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
-        plan = replace(plan, always=[*zero_updates(record, zupt, *logs), *disturbances])
+        plan = replace(plan, always=[*zero_updates(record, zupt, *logs_of_speed(given)), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
     plan, used, track, wanders = filtered(plan, given, smooth)
-    evidence = [*_seen(plan, track, used), *taken, *wanders, *why, *said]
+    evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said]
     least = None
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
@@ -273,11 +274,12 @@ def _model(begin: Start, further: Sequence[Group | str], every_axis: bool, heigh
     return InsModel.from_spec(spec, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
 
 
-def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
+def _seen(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec) -> list[Evidence]:
     """What the measurements and the log show."""
     evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
     receiver = record_of(given, Gnss)
     evidence += [] if receiver is None else gnss_evidence(receiver)
+    evidence += shift_evidence(plan.record, spec, track, *logs_of_speed(given))
     unused = "baro" in given and plan.altitude != "baro"
     return [*evidence, *([note("height.barometer_unused", "use_barometer", altitude=plan.altitude)] if unused else [])]
 
@@ -305,8 +307,7 @@ def _rivals(
         return replace(plan, start=start, model=modelled(other)).run(aiding, smooth=smooth)
 
     others = poorer_tracks(of_another_imu, track, spec)
-    usual = partial(again, plan.slow)
-    without = [partial(again, less) for less in one_less(plan.slow)]
+    usual, without = partial(again, plan.slow), [partial(again, less) for less in one_less(plan.slow)]
     found = noise_evidence(usual, track, plan.model, plan.record)
     found += spike_evidence(of_record, track, plan.record)
 
@@ -331,8 +332,7 @@ def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) 
         other = replace(plan, slow=slow)
         return other.run(other.sources({**given, Gnss.key: replace(receiver, record=log)}), smooth=smooth)
 
-    without = [partial(with_log, less) for less in one_less(plan.slow)]
-    usual = partial(with_log, plan.slow)
+    usual, without = partial(with_log, plan.slow), [partial(with_log, less) for less in one_less(plan.slow)]
     found = led_by_evidence(usual, track, receiver.record, without)
     return found if plan.altitude == "fixed" else found + height_evidence(usual, track, receiver.record, without)
 
