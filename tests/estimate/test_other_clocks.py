@@ -14,6 +14,8 @@ from truenorth.alignment import align
 from truenorth.coarse.odometer import gnss_alignment
 from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.other_clocks import clock_ratio
+from truenorth.estimate.poorer import poorer_evidence
+from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.navigation import Mounting, navigate
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
@@ -118,3 +120,24 @@ def test_a_coarse_alignment_takes_a_rate_that_is_known(velocities):
     two = gnss_alignment(record, apart, Mounting(drift=Drift(rate, 0.0, 0.0))).C_n0_i
     np.testing.assert_allclose(two, one, atol=1e-9)
     assert np.abs(gnss_alignment(record, apart).C_n0_i - one).max() > 1e-3
+
+
+def test_a_poorer_imu_that_loses_its_track_is_no_explanation():
+    """An hour with clocks 500 ppm apart was refused for one: it rejected nearly all rows, and those that it took fitted."""
+    n = 200
+
+    def track(taken):
+        at, used = np.arange(float(n)), np.arange(n) >= n - taken
+        e = (
+            0.05
+            * np.random.default_rng(2).standard_normal((n, 3))
+            * np.where(used, 0.1 if taken < n else 1.0, 100.0)[:, None]
+        )
+        sigma, nis = np.full((n, 3), 0.05), np.sum((e / 0.05) ** 2, axis=1)
+        said = Residuals("GNSS velocity", at, e, sigma, nis, used, int(n - taken), at, np.zeros(n, dtype=bool))
+        C, P = np.tile(np.eye(3), (n, 1, 1)), np.tile(np.eye(15), (n, 1, 1))
+        return Track(at, C, 0.0 * e, 0.0 * e, np.zeros((n, 15)), P, Layout(), (said,))
+
+    sound, lost = track(n), track(20)
+    assert likelihood_ratio(sound.residuals, lost.residuals) > 10.0
+    assert poorer_evidence(lambda spec: lost, sound, imu_spec("consumer")) == []

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import Rival, effect_of, last_sizes, likelihood_ratio, moved, nearest, rival
+from truenorth.estimate.slow_fit import bounded_misfit
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.judge import weight
@@ -139,6 +140,16 @@ def _chances(others: Sequence[Other]) -> Array:
     return np.asarray(odds / (1.0 + odds.sum()))
 
 
+def more_rejected(first: Track, other: Track) -> bool:
+    """Whether the gates of another track keep out more of a sensor's rows than the first one's, and than chance and some jumps do.
+
+    Those that both take say nothing of it: a filter that has lost its track rejects nearly all rows, and the few that it takes
+    fit as it likes. Rejected ones count as much as the gate allows then.
+    """
+    had = {r.name: r.rejected for r in first.residuals}
+    return any(r.rejected - had.get(r.name, 0) > limit("rejected") * max(len(r.time), 1) for r in other.residuals)
+
+
 def _climb(
     run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec, fields: Sequence[str]
 ) -> Iterator[tuple[float, float, Track]]:
@@ -152,6 +163,8 @@ def _climb(
         except DataError:  # the filter broke down: no explanation
             return
         ratio = likelihood_ratio(first.residuals, track.residuals)
+        if more_rejected(first, track):
+            ratio = min(ratio, bounded_misfit(first.residuals) - bounded_misfit(track.residuals))
         if ratio < -limit("ruled out"):
             return
         yield factor, ratio, track
