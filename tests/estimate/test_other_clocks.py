@@ -12,7 +12,7 @@ from tests.runs import some
 from truenorth.aiding.aids import Gnss
 from truenorth.alignment import align
 from truenorth.coarse.odometer import gnss_alignment
-from truenorth.estimate.latency import as_late_as_found
+from truenorth.estimate.latency import as_late_as_found, counted_between
 from truenorth.estimate.other_clocks import clock_ratio
 from truenorth.estimate.poorer import poorer_evidence
 from truenorth.estimate.rivals import likelihood_ratio
@@ -85,6 +85,17 @@ def test_what_a_log_moves_a_rate_by(rate, sigma, wider):
     track = Track(np.array([0.0, 10.0]), np.tile(np.eye(3), (2, 1, 1)), still, still, sensors, P, layout, ())
     antenna = Mounting(latency_sigma=0.2)
     assert (as_late_as_found(antenna, track, "GNSS").clock.rate_sigma > QUARTZ) == wider
+
+
+def test_a_delay_is_counted_from_that_of_the_same_moment():
+    """A mounting whose delay is that of the end has another latency than that of the beginning, and is as late."""
+    layout, still, sensors = Layout(("GNSS lag",), ((0.2, QUARTZ),)), np.zeros((2, 3)), np.zeros((2, 17))
+    sensors[:, 15] = 0.02
+    P = np.tile(np.eye(17), (2, 1, 1))
+    track = Track(np.array([0.0, 100.0]), np.tile(np.eye(3), (2, 1, 1)), still, still, sensors, P, layout, ())
+    given = Mounting(latency=0.1, drift=Drift(1e-3, 1e-4, 0.0))
+    at_end = replace(given, latency=0.2, drift=Drift(1e-3, 1e-4, 100.0))
+    np.testing.assert_allclose(counted_between(track, "GNSS", at_end, given).sensors[:, 15], 0.02, atol=1e-12)
 
 
 def test_a_ratio_counts_the_seconds_of_each_clock():

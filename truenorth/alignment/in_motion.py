@@ -26,7 +26,7 @@ from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
-from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
+from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, OUTPUT, MovingTask, has_fixes, in_body_axes, moving_task
 from truenorth.alignment.in_motion_untold import UNTOLD, hidden_from, of_level
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
@@ -252,9 +252,11 @@ def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[
 
 def _on_another_clock(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, list[Evidence]]:
     """Task and first pass on a receiver's clock that runs far apart from the IMU's, where the log says so; else the same."""
+    end = float(found.track.time[-1])
+    until = end if task.record.time[-1] - end > OUTPUT else None  # of a bank's log the first part
 
     def run(antenna: Mounting) -> Track:
-        return replace(task, antenna=antenna).run(found.guess, gated=False)
+        return replace(task, antenna=antenna).run(found.guess, gated=False, until=until)
 
     best, unsure = (None, []) if task.gnss is None else best_clock(run, task.antenna, found.track)
     if best is None:

@@ -13,7 +13,7 @@ from truenorth.alignment.in_motion_passes import begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.latency import SHOWN_DELAY, as_it_runs, as_stamped, counted_from, delay_of
+from truenorth.estimate.latency import SHOWN_DELAY, as_it_runs, as_stamped, counted_between, delay_of
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
@@ -50,7 +50,7 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
             return []
         if ratio > limit("rival"):
             kind: Kind = "hint" if may_be_chance(ratio) else "known"
-            counted = counted_from(late, "GNSS", open_.antenna.latency - task.antenna.latency)
+            counted = counted_between(late, "GNSS", open_.antenna, task.antenna)
             lags = {name: delay_of(counted, name) for name in shut}
             off = {name: lag for name, lag in lags.items() if lag is not None and abs(lag[0]) > SHOWN_DELAY * lag[1]}
             whole = moved(track, late)

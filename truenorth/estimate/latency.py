@@ -94,7 +94,7 @@ def _running_as_found(mounting: Mounting, track: Track, rate: tuple[float, float
         return mounting
     if abs(value) > SHOWN_DELAY * sigma:
         return as_it_runs(mounting, track)
-    apart = mounting.clock.rate != 0.0 and sigma < WEAK * prior
+    apart = mounting.clock.rate != 0.0 and sigma < WEAK * prior and abs(mounting.clock.rate + value) < 3.0 * WORST_CLOCK
     return _at_another_rate(mounting, value, begin) if apart and abs(value) > SETTLED * sigma else mounting
 
 
