@@ -12,7 +12,7 @@ from tests.runs import some
 from truenorth.aiding.aids import Gnss
 from truenorth.alignment import align
 from truenorth.coarse.odometer import gnss_alignment
-from truenorth.estimate.latency import as_late_as_found, counted_between
+from truenorth.estimate.latency import counted_between
 from truenorth.estimate.other_clocks import clock_ratio
 from truenorth.estimate.poorer import poorer_evidence
 from truenorth.estimate.rivals import likelihood_ratio
@@ -72,19 +72,6 @@ def test_aligned_on_a_clock_that_is_off_by_one_percent(run):
     error = off(answer.moving.track[-1:], motion, -1e4)
     assert np.abs(error).max() < 4.0, error
     assert "clock.runs_slow" in {item.key for item in answer.evidence}
-
-
-@pytest.mark.parametrize(
-    ("rate", "sigma", "wider"), [(60e-6, 148e-6, False), (90e-6, 148e-6, True), (400e-6, 9e-6, False)]
-)
-def test_what_a_log_moves_a_rate_by(rate, sigma, wider):
-    """By the root of ``s0^2 - s^2``: 24 ppm where the log shows hardly anything, and all of its prior where it shows all."""
-    P, sensors = np.tile(np.eye(17), (2, 1, 1)), np.zeros((2, 17))
-    P[:, 16, 16], sensors[:, 16] = sigma**2, rate
-    layout, still = Layout(("GNSS lag",), ((0.2, QUARTZ),)), np.zeros((2, 3))
-    track = Track(np.array([0.0, 10.0]), np.tile(np.eye(3), (2, 1, 1)), still, still, sensors, P, layout, ())
-    antenna = Mounting(latency_sigma=0.2)
-    assert (as_late_as_found(antenna, track, "GNSS").clock.rate_sigma > QUARTZ) == wider
 
 
 def test_a_delay_is_counted_from_that_of_the_same_moment():

@@ -9,14 +9,12 @@ which nobody spoke have many sizes, delays have few: where an arm is found beyon
 taken what it could not hold. The next pass then has a wider arm, and the delay as it was.
 
 The clocks of a receiver and an IMU run at two rates: of quartz, 10 to 100 ppm apart, .04 to .4 s in an hour. So the delay of a
-receiver has a rate, which is a state too, and a pass begins with the rate that the one before has found. What a log moves a sound
-rate by has the variance ``s0^2 - s^2`` of its prior s0 and its sigma s, however little it shows. A rate that is moved by more is
-that of a poorer clock, and the next pass has a wider prior.
+receiver has a rate, which is a state too, and a pass begins with the rate that the one before has found. A rate that is found
+beyond its prior is that of a poorer clock, and the next pass has a wider prior, as of an arm.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -35,7 +33,9 @@ from truenorth.state.track import Residuals, Track
 Array = NDArray[np.float64]
 
 LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
-LONG_ARM = 2.0  # sigmas of a prior, from which an arm that nobody has said shows a larger vehicle
+LONG_ARM = (
+    2.0  # sigmas of a prior, from which an arm that nobody has said shows a larger vehicle, a rate a poorer clock
+)
 WIDER = 10.0  # times the prior of such a rate: quartz, ceramic resonators, oscillators of a chip without either
 WORST_CLOCK = 1e-2
 CLOCK_DIGITS = 6  # of a stamp, s
@@ -87,7 +87,7 @@ def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
 def _running_as_found(mounting: Mounting, track: Track, rate: tuple[float, float, float]) -> Mounting:
     """The mounting of a receiver whose clock runs as a track has found it (rate, sigma, prior), or may run further apart."""
     value, sigma, prior = rate
-    if _beyond_its_prior(rate) and prior < WORST_CLOCK:
+    if abs(value) > LONG_ARM * prior and prior < WORST_CLOCK:
         return replace(mounting, drift=mounting.clock._replace(rate_sigma=min(WIDER * prior, WORST_CLOCK)))
     begin, end = float(track.time[0]), float(track.time[-1])
     if abs(value) * (end - begin) <= LEAST_DELAY:
@@ -96,11 +96,6 @@ def _running_as_found(mounting: Mounting, track: Track, rate: tuple[float, float
         return as_it_runs(mounting, track)
     apart = mounting.clock.rate != 0.0 and sigma < WEAK * prior and abs(mounting.clock.rate + value) < 3.0 * WORST_CLOCK
     return _at_another_rate(mounting, value, begin) if apart and abs(value) > SETTLED * sigma else mounting
-
-
-def _beyond_its_prior(rate: tuple[float, float, float]) -> bool:
-    """Whether a log moves a rate (its value, sigma and prior) by more than chance explains."""
-    return abs(rate[0]) > SHOWN_DELAY * math.sqrt(max(rate[2] ** 2 - rate[1] ** 2, 0.0))
 
 
 def _at_another_rate(mounting: Mounting, rate: float, begin: float) -> Mounting:

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from truenorth.core.errors import DataError
-from truenorth.estimate.latency import WORST_CLOCK, as_stamped, best_rate
+from truenorth.estimate.latency import SHOWN_DELAY, WORST_CLOCK, as_stamped, best_rate
 from truenorth.estimate.rivals import effect_of, last_sizes, likelihood_ratio
 from truenorth.quality.swing import VELOCITIES
 from truenorth.state.evidence import NO_EFFECT, Evidence, Figure
@@ -81,7 +81,11 @@ def best_clock(
             continue
         found.append(Clocked(other, clocked, clock_ratio(track, clocked, antenna, other)))
     best = max(found, key=lambda one: one.ratio, default=None)
-    if best is None or best.ratio > limit("rival"):
+    if best is None or (shown := best_rate(best.track)) is None:
+        return None, []
+    if abs(best.antenna.clock.rate + shown[0]) <= SHOWN_DELAY * shown[1]:  # its freedom explains something else
+        return None, []
+    if best.ratio > limit("rival"):
         return best, []
     return None, _unsure(track, found, best)
 
