@@ -12,6 +12,7 @@ from truenorth.aiding.velocity import SMOOTHED_VELOCITY
 from truenorth.aiding.wheel import COUNTED_FORWARD, WHEEL
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.linalg import padded
+from truenorth.errors.axes import gyro_axes
 from truenorth.errors.group import Group
 from truenorth.errors.model import InsModel
 from truenorth.estimate.correct import feed_back, measure
@@ -19,8 +20,9 @@ from truenorth.estimate.memory import Model, memory
 from truenorth.estimate.predict import describe
 from truenorth.estimate.run import kernel_sources, with_states
 from truenorth.filters.recursion import workspace
-from truenorth.state.layout import BG
-from truenorth.state.now import NOW_LENGTH
+from truenorth.records.specs import imu_spec
+from truenorth.state.layout import BG, GYRO_AXES
+from truenorth.state.now import NOW_LENGTH, NOW_OTHER_RATE, NOW_RATE, NOW_RATE_NOISE, NOW_TURN
 from truenorth.strapdown import wander
 
 LAT, LON, ALT = 1.2, -2.0, 500.0
@@ -161,3 +163,43 @@ def test_a_late_body_velocity_is_that_of_the_earlier_axes(w):
     counted, change = row(C, v_b, lag, 0.0)  # of a wheel: that it does not slide holds at every moment
     np.testing.assert_allclose(counted, [row(C, v_b, 0.0)[0][0], late[1], row(C, v_b, 0.0)[0][2]], atol=1e-12)
     np.testing.assert_allclose(change, [0.0, 1.02 * (C_mb @ push)[1], 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["velocity", "smoothed velocity", "body velocity", "odometer"])
+def test_scale_and_axes_of_gyros_are_in_the_swing_of_a_sensor_on_its_arm(kind):
+    """``w_hat = (I + M) w``: a row by the rate as measured, M being assumed, is that by the true rate; its columns are the change.
+
+    The noise of the rate adds its variance along the columns of a bias.
+    """
+    source = _aiding(kind)
+    model = with_states(replace(MODEL, groups=(*MODEL.groups, gyro_axes(imu_spec("consumer")))), [source])
+    axes, n = model.layout.slice_of(GYRO_AXES), model.states
+    s = wander.state_at(dcm_from_euler(0.4, 0.1, -0.2), [60.0, 30.0, 2.0], LAT, LON, ALT)
+    of = Model(model.dynamics, model.sensor_states, False, 0.0, 0.0, False, True, False)
+    assert of.sensors[2] == axes.start
+
+    def row(w_b, M, noise=0.0):
+        aux = np.zeros(n)
+        aux[axes] = M.ravel()
+        if kind == "smoothed velocity":  # what M does to the quick part is in D
+            aux[model.layout.slice_of("sensor filter")] = np.cross(M, source.lever_arm, axis=0).ravel()
+        m = memory(s, aux, np.eye(n), 0.0, 1)
+        wander.set_matrix(s, m.sums.C_now)
+        w, now, R = workspace(padded(n), 3), np.zeros(NOW_LENGTH), np.ones(3)
+        describe(m, of, now)
+        for place in (NOW_RATE, NOW_OTHER_RATE):
+            now[place : place + 3] = w_b
+        now[NOW_TURN : NOW_TURN + 3] += w_b
+        now[NOW_RATE_NOISE] = noise
+        measure(m, of, kernel_sources([source], model), 0, source.measured[0].copy(), now, w, R)
+        return w.z.copy(), w.H[:, :n].copy(), R
+
+    M = 0.01 * np.array([[1.0, -2.0, 0.5], [0.3, -0.8, 1.1], [-1.5, 0.7, 0.4]])
+    true, H, R = row(W_B, np.zeros((3, 3)))
+    np.testing.assert_allclose(row((np.eye(3) + M) @ W_B, M)[0], true, atol=6e-4)  # squares of M
+    if kind != "smoothed velocity":
+        np.testing.assert_allclose(row(W_B, M)[0] - true, -H[:, axes] @ M.ravel(), atol=1e-12)
+    assert np.abs(H[:, axes] @ M.ravel()).max() > 0.01
+    np.testing.assert_array_equal(R, np.ones(3))
+    noisy = row(W_B, M, 1e-4)
+    np.testing.assert_allclose(noisy[2], 1.0 + 1e-4 * np.sum(noisy[1][:, BG] ** 2, axis=1))

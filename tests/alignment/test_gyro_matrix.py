@@ -11,13 +11,17 @@ from tests.quality.test_tilt import _moored
 from tests.runs import some
 from truenorth.aiding.aids import Indexer
 from truenorth.alignment import align, gyro_matrix
+from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
+from truenorth.simulation import Sway, Tone, simulate
 from truenorth.state.limits import limit
 
 SEED = 46
+TONES = (0.17, 6.0, 0.4), (0.12, 5.0, 0.8), (0.09, 7.0, 1.0)  # rad, s, rad
+DOCK = Position.from_degrees(40.0, 118.0)
 
 
 def turned(record, degrees):
@@ -105,6 +109,21 @@ def test_gyros_as_good_as_their_specification_are_not_turned(run):
     answer = BENCHES["swaying"].align(inputs)
     assert turn_found(answer) is None
     assert answer.status == "aligned"
+
+
+@pytest.mark.parametrize("runs", [1, pytest.param(8, marks=pytest.mark.slow)])
+def test_accelerometers_as_good_as_their_specification_make_no_gyro_matrix(runs, monkeypatch):
+    """Their scale factors and axes swing gravity in step with the tilt as well: 256 squares of eight runs, with gyros alone."""
+    asked, explained = [], gyro_matrix._explained
+    monkeypatch.setattr(gyro_matrix, "_explained", lambda *given: asked.append(explained(*given)) or 0.0)
+    imu = replace(imu_spec("navigation"), accel_scale_factor=3e-4, accel_misalignment=1e-4)
+    tones = {
+        name: (Tone(*tone),) for name, tone in zip(("roll_tones", "pitch_tones", "heading_tones"), TONES, strict=True)
+    }
+    for seed in range(1, runs + 1):
+        log = simulate(Sway(DOCK, **tones), rate=50.0, duration=300.0, imu=imu, seed=seed).record
+        align(log, DOCK, imu=imu)
+    assert sum(asked) < chi_square_limit(1e-3, 9 * runs)
 
 
 @pytest.mark.parametrize("seed", some([7], [3, 8, 15, 16, 22]))

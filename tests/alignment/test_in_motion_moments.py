@@ -11,7 +11,7 @@ from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.campaign.fault_benches import DRIVE
 from truenorth.navigation import Mounting
-from truenorth.quality.swing import swing, with_unseen_arm
+from truenorth.quality.swing import swing, unseen_sigma, with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
 from truenorth.state.layout import ANTENNA_ARM, Layout
@@ -101,12 +101,12 @@ def test_what_is_quick_of_a_rate():
     source = Aiding(
         "GNSS velocity", "velocity", at, zero, zero + 0.1, ARM, states=state("GNSS", "lever arm", np.full(3, 0.5))
     )
-    (found,) = with_unseen_arm([source], record)
+    (found,) = with_unseen_arm([source], record, 1e-3)
     assert np.allclose(found.measured[:, 3], 0.1 * np.sin(2.0 * np.pi * at / 0.25), atol=0.003)
     assert np.allclose(found.measured[:, 4:], 0.0, atol=0.003)
-    assert found.states["filter"].sigma == pytest.approx(np.hypot(ARM, 0.5))
+    assert found.states["filter"].sigma == pytest.approx(unseen_sigma(np.hypot(ARM, 0.5), 1e-3))
     known = replace(source, states={})
-    assert with_unseen_arm([known], record)[0] is known
+    assert with_unseen_arm([known], record, 1e-3)[0] is known
 
 
 def test_a_swing_that_is_not_shown_is_said():

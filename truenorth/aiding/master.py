@@ -40,6 +40,7 @@ from truenorth.aiding.row import (
     MOUNT,
     OWN,
     Row,
+    beyond_noise,
     by_axes,
     lag_now,
     row,
@@ -70,7 +71,6 @@ from truenorth.state.now import (
 from truenorth.strapdown.wander import acceleration, curvature, earth_axis
 
 _PHI, _DP, _BG = 0, 6, 9
-_BY_CHANCE = 6.0  # of chi-square with three degrees of freedom a tenth is beyond
 
 
 @compiled
@@ -94,13 +94,6 @@ def turned_from_north(now: Any, q: Any, first: int) -> Any:
     half = 0.5 * math.atan2(now[NOW_NORTH], now[NOW_NORTH + 1])
     turn = (math.cos(half), 0.0, 0.0, -math.sin(half))
     return quaternion_product(turn, (q[first], q[first + 1], q[first + 2], q[first + 3]))
-
-
-@compiled
-def beyond_noise(rate: Any, variance: float) -> float:
-    """Share of a rate that is not within its noise: squares of noise are no knowledge."""
-    size = rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
-    return max(0.0, 1.0 - _BY_CHANCE * variance / max(size, 1e-30))
 
 
 @row

@@ -31,6 +31,7 @@ ROLES = {
     "own": AT_OWN,
     "filter": AT_FILTER,
 }
+_BY_CHANCE = 6.0  # of chi-square with three degrees of freedom a tenth is beyond
 LEVEL_FRAME, BODY_FRAME = ("east", "north", "up"), ("right", "forward", "up")
 
 
@@ -84,6 +85,13 @@ def with_state(values: Any, first: int, assumed: Any, at: int) -> Any:
     if at >= 0:
         a, b, c = a + assumed[at], b + assumed[at + 1], c + assumed[at + 2]
     return a, b, c
+
+
+@compiled
+def beyond_noise(rate: Any, variance: float) -> float:
+    """Share of a rate that is not within its noise: squares of noise are no knowledge."""
+    size = rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
+    return max(0.0, 1.0 - _BY_CHANCE * variance / max(size, 1e-30))
 
 
 @compiled

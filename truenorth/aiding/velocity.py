@@ -5,7 +5,12 @@ Its own states are a drift east and north (:mod:`truenorth.errors.log`): ``z = v
 An antenna moves by ``w x l`` besides its vehicle. A receiver that filters its velocities does not show all of what is quick in
 that: with q the part of w that is quicker than its filter, and d the arm whose swing it leaves out, it shows
 
-    y = v + C (w x l - q x d):  z = y_hat - y = ... - C (w x dl) + C (q x dd)
+    y = v + C (w x l - q x d):  z = y_hat - y = ... - C (w x dl) + C dD q,  D q = q x d
+
+A filter shows less of a swing the quicker it is, and each axis swings in its own time: so there is a d for the rate about each
+axis, and ``q x d`` has six numbers. What gyros that are askew by M do to the quick part, ``C (M q x l)``, is among them: how much
+of it is shown nobody knows either. Along an axis that a swing about it does not move it is three more: all is ``C D q``, D any
+matrix. With one d for all, a roll that is shown otherwise than a pitch made a gyro's scale six times what its specification says.
 
 So an arm that nobody has said is known by slow turns and by places, and what is quick says how much of it is shown, l - d, alone.
 Else the swing that is missing would be a shorter arm (ours; :mod:`truenorth.quality.swing`).
@@ -22,7 +27,20 @@ from dataclasses import replace
 from typing import Any
 
 from truenorth.aiding.position import convergence, into_north
-from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_FILTER, AT_LAG, AT_OWN, OWN, Row, lag_now, row, with_state
+from truenorth.aiding.row import (
+    ARM,
+    AT_ARM,
+    AT_BIAS,
+    AT_FILTER,
+    AT_LAG,
+    AT_OWN,
+    OWN,
+    Row,
+    by_axes,
+    lag_now,
+    row,
+    with_state,
+)
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
@@ -118,16 +136,17 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 def _smoothed(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     C, quick, unseen = matrix_of(now, NOW_C), vector_of(measured, 3), (0.0, 0.0, 0.0)
     if at[AT_FILTER] >= 0:
-        unseen = cross(quick, vector_of(assumed, at[AT_FILTER]))
+        a = at[AT_FILTER]
+        unseen = by_axes(assumed, a, quick)
         for j in range(3):
-            m = cross(quick, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)))
             for i in range(3):
-                H[i, at[AT_FILTER] + j] = C[i, 0] * m[0] + C[i, 1] * m[1] + C[i, 2] * m[2]
+                for k in range(3):
+                    H[i, a + 3 * j + k] = C[i, j] * quick[k]
     _shown(now, figures, at, assumed, measured, unseen, H, z)
 
 
 VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "bias": 3, "own": 2}, swings=True)
 # As measured: velocity, and the rate of the body less its mean over what the receiver filters, rad/s, body axes.
 SMOOTHED_VELOCITY = replace(
-    VELOCITY, name="smoothed velocity", function=_smoothed, sizes={**VELOCITY.sizes, "filter": 3}, width=6
+    VELOCITY, name="smoothed velocity", function=_smoothed, sizes={**VELOCITY.sizes, "filter": 9}, width=6
 )

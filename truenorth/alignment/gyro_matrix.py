@@ -7,13 +7,14 @@ a body whose gyros sit right it is off by the turn. So what of a turn is about l
 s show a turn to .1 to .6 deg, a scale factor to 3 % (:mod:`truenorth.quality.tilt`), behind all that the base does of its own, and
 behind its arm, which swings in the same way. The filter of the answer has the base's motion and the arm among its states.
 
-First it is asked what each entry of ``M`` does to its measurements: the squares that this explains are a chi-square of nine degrees
-of freedom where the gyros are as their specification says (19 on the average of 24 sound sways, 4 of indexers). Where they are
-more, the likeliest ``M`` is searched: the log is aligned with it among the states, as large as it likes, or put right by what the
-innovations show of it, and aligned anew, the motion fitted anew. A push of waves in step with the tilt makes such a matrix seem,
-too: :mod:`~truenorth.alignment.put_right`. Of 40 gyros turned by .3 to 3 deg, or scaled or askew by .3 to 5 %, a push explained .1
-to 4 % of what their matrix does, of one more 12 %; of 32 sound ships, buoys and rafts 20 % and more. In between, and where late
-gyros explain as much, what the matrix does is in sigma.
+First it is asked what each entry of ``M`` does to its measurements, and with it the accelerometers' scale factors, axes and
+biases, as large as their specification says: they swing gravity in step with the tilt as well, and no filter of a sway has
+them. The squares that ``M`` explains are a chi-square of nine degrees of freedom where the gyros are as their specification
+says. Where they are more, the likeliest ``M`` is searched: the log is aligned with it among the states, as large as it likes,
+or put right by what the innovations show of it, and aligned anew, the motion fitted anew. A push of waves in step with the tilt
+makes such a matrix seem, too: :mod:`~truenorth.alignment.put_right`. Of 40 gyros turned by .3 to 3 deg, or scaled or askew by
+.3 to 5 %, a push explained .1 to 4 % of what their matrix does, of one more 12 %; of 32 sound ships, buoys and rafts 20 % and
+more. In between, and where late gyros explain as much, what the matrix does is in sigma.
 
 A gyro's noise is in its own rate, by which its scale factor is found: of turns of variance s^2 with a random walk of n^2 in them,
 the noise looks like a scale factor of ``n^2 / (s^2 + n^2)`` too much (errors in variables). A log is likelier the less noise its
@@ -33,6 +34,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.put_right import Anew, hardly_sampled, in_step, likelihood, through_filter
 from truenorth.alignment.swaying import SwayAlignment
+from truenorth.alignment.swung_bias import swung_biases
 from truenorth.alignment.windowed import response
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.attitude import misalignment
@@ -80,7 +82,7 @@ def gyro_matrix_evidence(
     record : ImuRecord
         Of which it is.
     imu : ImuSpec
-        Whose gyros may be off by as much as it says.
+        Whose sensors may be off by as much as it says.
     anew : callable
         Of :func:`truenorth.alignment.put_right.aligned_anew`.
     others : sequence of Evidence
@@ -88,7 +90,7 @@ def gyro_matrix_evidence(
     """
     if hardly_sampled(record):
         return []
-    M, P = _response(fine)
+    M, P = _response(fine, imu)
     seen = _seen(record, imu, np.sqrt(np.diag(P)[::4]))
     if _explained(M, P, imu, seen) < chi_square_limit(limit("matrix"), int(seen.sum())):
         return []
@@ -169,7 +171,7 @@ def _without(M: Array, P: Array, seen: Mask) -> tuple[Array, Array]:
     return kept @ (weight @ M), kept
 
 
-def _response(fine: SwayAlignment, size: float = np.inf) -> tuple[Array, Array]:
+def _response(fine: SwayAlignment, imu: ImuSpec | None = None, size: float = np.inf) -> tuple[Array, Array]:
     """The gyros' matrix (9,) that the innovations of a filter show, its motion held, and its covariance (9, 9).
 
     By the attitude as it sways: by its slow part, by which biases act, a gyro about the vertical that sees a part of the roll shows
@@ -177,14 +179,24 @@ def _response(fine: SwayAlignment, size: float = np.inf) -> tuple[Array, Array]:
 
     Parameters
     ----------
+    imu : ImuSpec, optional
+        Of accelerometers whose errors explain what they can; of a step of a search, which the likelihood judges, they need not.
     size : float
         One sigma of each entry.
     """
     log, base = fine.about, fine.estimator.base
     bigger = with_matrices(base, log.right_record, log.integrals, log.C_n0_i, log.position.lat)
-    made, _, white = through_filter(fine, response(bigger)[0][:, :, base.states : base.states + 9])
-    P = np.asarray(np.linalg.pinv(made.T @ made + np.eye(9) / size**2, hermitian=True), dtype=np.float64)
-    return P @ (made.T @ white), P
+    causes = response(bigger)[0][:, :, base.states :]
+    if imu is None:
+        causes = causes[:, :, :9]
+    else:
+        causes[:, :, 9:] *= np.where(ONE, imu.accel_scale_factor, imu.accel_misalignment).ravel()
+        swung = swung_biases(fine, np.sqrt(imu.bias_variance[3:]), log.position, log.C_sb)
+        causes = np.concatenate([causes, swung], axis=2)
+    made, _, white = through_filter(fine, causes)
+    known = np.concatenate([np.full(9, size**-2), np.ones(made.shape[1] - 9)])
+    P = np.asarray(np.linalg.pinv(made.T @ made + np.diag(known), hermitian=True), dtype=np.float64)
+    return (P @ (made.T @ white))[:9], P[:9, :9]
 
 
 def _put_right(record: ImuRecord, imu: ImuSpec, anew: Anew, fine: SwayAlignment, seen: Mask) -> tuple[_Found, float]:
@@ -231,7 +243,7 @@ def _left_open(record: ImuRecord, best: _Found, wide: ImuSpec, anew: Anew, seen:
 
 def _stepped(record: ImuRecord, best: _Found, anew: Anew, seen: Mask) -> _Found:
     """With the matrix that the innovations of the best so far show, or a multiple of it, as long as the log becomes likelier."""
-    M, P = _without(*_response(best.fine, OPEN[-1]), seen)
+    M, P = _without(*_response(best.fine, size=OPEN[-1]), seen)
     found, before = _corrected(record, best, M, np.diag(P), anew), best
     while _likelihood(found) > _likelihood(before) and 2.0 * np.abs(M).max() <= LARGEST:
         M, before = 2.0 * M, found

@@ -18,7 +18,7 @@ from truenorth.alignment.in_motion_start import Guess, coarse_guess, start_at
 from truenorth.core.earth import radii
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.axes import standing
+from truenorth.errors.axes import axis_sigma, standing
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
@@ -174,7 +174,11 @@ class MovingTask:
             )
         if self.gnss is not None:
             shown = from_gnss(self.gnss, antenna)
-            found += with_unseen_arm(shown, self.record) if self.swing_apart else shown
+            found += (
+                with_unseen_arm(shown, self.record, float(axis_sigma(self.spec)[0].max()))
+                if self.swing_apart
+                else shown
+            )
         found += [source if gated else replace(source, gate=0.0) for source in self.more]
         found = with_scatter(louder(with_slow(found, self.lasting), self.factors), self.scattered)
         return on_springs(found) if self.sprung else found

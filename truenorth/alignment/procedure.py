@@ -335,7 +335,8 @@ def _align_inertial(
     if short:
         check = may_swing_on_lines(check, task.position)
     swung = sways or swings
-    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if swung else None
+    likely = used if spec is not None else with_usual(used)
+    others = matrix_signatures(fine, likely) if swung else None
     if swung and not sways and fine.form == "velocity":
         biased = swung_biases(fine, np.sqrt(used.bias_variance[3:]), task.position)
         others = biased if others is None else np.concatenate([others, biased], axis=2)
@@ -346,7 +347,7 @@ def _align_inertial(
         steps += late_gyros_evidence(fine, fine.late, task.record)
         anew = aligned_anew(fine, start, turned=turned, axes=spec)
         steps += late_gyro_evidence(fine, task.record, anew) + scale_on_sway_evidence(fine, task.record, anew)
-        steps += gyro_matrix_evidence(fine, task.record, used, anew, steps)
+        steps += gyro_matrix_evidence(fine, task.record, likely, anew, steps)
     way = farthest(fine, task.position) if swung else math.inf
     moved = _moves_on(task, fine) if swung else None
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, moved)

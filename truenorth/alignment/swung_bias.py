@@ -17,7 +17,7 @@ from truenorth.errors.sway import without_sway
 Array = NDArray[np.float64]
 
 
-def swung_biases(fine: FineAlignment, sigma: Array, position: Position) -> Array:
+def swung_biases(fine: FineAlignment, sigma: Array, position: Position, C_sb: Array | None = None) -> Array:
     """(K, 3, 3) mean velocities of the intervals (E, N, U), m/s, of a bias of one sigma along each axis.
 
     Parameters
@@ -26,9 +26,11 @@ def swung_biases(fine: FineAlignment, sigma: Array, position: Position) -> Array
         In the velocity form.
     sigma : (3,) array, m/s^2
     position : Position
+    C_sb : (K+1, 3, 3) array, optional
+        Attitude of the base in the IMU, of one on an indexer.
     """
     log = fine.integrals
-    swings = fine.C_n0_i @ (log.C_mean - without_sway(log).C_mean)
+    swings = fine.C_n0_i @ (log.C_mean - without_sway(log, C_sb).C_mean)
     gained = log.intervals[:, None, None] * swings * sigma
     velocity = np.cumsum(gained, axis=0) - 0.5 * gained
     return np.asarray(local_axes(log.time, position.lat) @ velocity)

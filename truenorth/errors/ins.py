@@ -140,8 +140,8 @@ def couple_sensors(C: Any, at: Any, fixed_altitude: bool, F: Any) -> None:
     ----------
     C : (3, 3) array
         Body to level frame.
-    at : (2,) array of int
-        First state of the slow gyro and accelerometer bias; -1: none.
+    at : array of int
+        First state of the slow gyro and accelerometer bias; -1: none. What follows them is for measurements.
     fixed_altitude : bool
         Vertical velocity is zero: nothing drives it.
     F : (N, N) array

@@ -88,8 +88,8 @@ class InsModel(Walks):
 
     @property
     def sensor_states(self) -> NDArray[np.int64]:
-        """(2,) what :func:`couple_sensors` asks for."""
-        return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL)])
+        """(3,) first states of the slow biases, for which :func:`couple_sensors` asks, and of the gyros' axes; -1: none."""
+        return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL, GYRO_AXES)])
 
     @cached_property
     def dynamics(self) -> Dynamics:

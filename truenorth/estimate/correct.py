@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from truenorth.aiding.row import row_at
+from truenorth.aiding.row import AT_FILTER, beyond_noise, by_axes, row_at
 from truenorth.core import earth
 from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product
 from truenorth.core.compiled import borrowing
@@ -22,7 +22,7 @@ from truenorth.filters.recursion import (
     row_variance,
     still_positive,
 )
-from truenorth.state.now import NOW_NORTH
+from truenorth.state.now import NOW_NORTH, NOW_OTHER_RATE, NOW_RATE, NOW_RATE_NOISE, vector_of
 from truenorth.strapdown.wander import displace
 
 _PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
@@ -42,6 +42,37 @@ def measure(m: Memory, model: Model, sources: Sources, source: int, measured: An
             for i in range(3):
                 for j in range(3):
                     w.H[i, slow + j] = w.H[i, whole + j]
+    if sources.swings[source]:
+        quick = (0.0, 0.0, 0.0)
+        if sources.states[source, AT_FILTER] >= 0:
+            quick = (measured[3], measured[4], measured[5])
+        swing_as_gyros_say(model.sensors[2], m.aux, now, quick, w.H, w.z, R)
+
+
+@borrowing(forceinline=True)
+def swing_as_gyros_say(axes: int, assumed: Any, now: Any, quick: Any, H: Any, z: Any, R: Any) -> None:
+    """What the gyros' errors do to the swing of a sensor on its arm, beyond those of their biases.
+
+    The swing ``w x l`` is of a rate ``w_hat = (I + M) w + eps + n``. A row has the column B of eps, ``C [e x l]`` of a velocity.
+    That of an element of M is ``B_i w_j``: on a mast that swings by 1 m/s a gyro that is 1 % askew looks like a body that is
+    turned by .6 deg, and it is a state already for what it does to attitude. What is assumed of M is taken off. The noise n of the
+    moment is new in each row, ``B n`` with the variance ``q sum a^2 dt`` of weights a over samples dt. Columns are by a rate whose
+    noise is not that of `z`, as those of an arm by a master (:mod:`truenorth.aiding.master`): one that is in both would be taken
+    for a scale. What M does to the `quick` part of the rate a row may have in states of its own (:mod:`truenorth.aiding.velocity`).
+    """
+    if axes >= 0:
+        rate, other = vector_of(now, NOW_RATE), vector_of(now, NOW_OTHER_RATE)
+        off = by_axes(assumed, axes, (rate[0] - quick[0], rate[1] - quick[1], rate[2] - quick[2]))
+        other = (other[0] - quick[0], other[1] - quick[1], other[2] - quick[2])
+        seen = beyond_noise(other, now[NOW_RATE_NOISE])
+        for i in range(3):
+            for j in range(3):
+                z[i] -= H[i, _BG + j] * off[j]
+                for k in range(3):
+                    H[i, axes + 3 * j + k] += seen * H[i, _BG + j] * other[k]
+    for i in range(3):
+        for j in range(3):
+            R[i] += now[NOW_RATE_NOISE] * H[i, _BG + j] * H[i, _BG + j]
 
 
 @borrowing(forceinline=True)

@@ -40,8 +40,8 @@ class Events(NamedTuple):
 class Sources(NamedTuple):
     """Of each source (S,): what it does, the address of its row, figures, places of its states, limits of NIS (S, 3).
 
-    `loop`: time constant of a vertical loop (s); `instant`: it needs the rate at its own time; `patience`: rows rejected
-    in a row until a jump is believed, and `opens`, the first of three states that take it up; `nudge`: how much later
+    `loop`: time constant of a vertical loop (s); `instant`: it needs the rate at its own time, `swings`: on an arm; `patience`:
+    rows rejected in a row until a jump is believed, and `opens`, the first of three states that take it up; `nudge`: how much later
     than its time a row may be taken (s).
     """
 
@@ -52,6 +52,7 @@ class Sources(NamedTuple):
     gates: Array
     loop: Array
     instant: NDArray[np.bool_]
+    swings: NDArray[np.bool_]
     patience: Integers
     opens: Integers
 

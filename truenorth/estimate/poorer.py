@@ -136,8 +136,10 @@ def growth_along(first: Track, others: Sequence[Other]) -> Array:
 
 def _chances(others: Sequence[Other]) -> Array:
     """That each of them is right, and the specification wrong."""
-    odds = np.exp(0.5 * (np.array([other.ratio for other in others]) - limit("rival")))
-    return np.asarray(odds / (1.0 + odds.sum()))
+    logs = 0.5 * (np.array([other.ratio for other in others]) - limit("rival"))
+    most = max(0.0, float(logs.max(initial=0.0)))  # else odds of thousands are infinite
+    odds = np.exp(logs - most)
+    return np.asarray(odds / (np.exp(-most) + odds.sum()))
 
 
 def more_rejected(first: Track, other: Track) -> bool:

@@ -32,6 +32,7 @@ from truenorth.state.now import (
     NOW_OTHER_RATE,
     NOW_PUSH,
     NOW_RATE,
+    NOW_RATE_NOISE,
     NOW_SINCE,
     NOW_SPIN,
     NOW_TURN,
@@ -159,13 +160,15 @@ def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: A
         since = t - at - 0.5 * (T_after - T_before)
         now[NOW_SPIN + j] = spin
         now[NOW_FORCE + j] = force + growth * since
-    weight, outside = 0.0, 0.0
+    weight, outside, noise = 0.0, 0.0, 0.0
     for k in range(last - 1, first - 1, -1):
         weight += _slope_weight(samples, first, last, k, t)
+        noise += weight * weight * samples.step[k]
         if k in (first, last - 1):
             outside += weight * samples.step[k]
         for j in range(3):
             now[NOW_RATE + j] += weight * samples.dtheta[k, j]
+    now[NOW_RATE_NOISE] = noise * now[NOW_GYRO_NOISE]
     for j in range(3):
         now[NOW_OTHER_RATE + j] = now[NOW_RATE + j]
     if last - first == 2 * BACK:

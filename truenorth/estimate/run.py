@@ -356,6 +356,7 @@ def kernel_sources(aiding: Sequence[Aiding], model: InsModel) -> Sources:
         gates,
         np.array([source.loop for source in aiding], dtype=np.float64),
         np.array([source.instant for source in aiding], dtype=np.bool_),
+        np.array([source.instant and source.row.swings for source in aiding], dtype=np.bool_),
         np.array([source.patience if source.opens is not None else NEVER for source in aiding], dtype=np.int64),
         opens,
     )
@@ -390,11 +391,8 @@ def _residuals(
 
 
 def _raise(code: int, time: float, source: Aiding) -> None:
-    why = (
-        "the variance of an innovation is not positive"
-        if code == NO_INNOVATION_VARIANCE
-        else "the covariance is lost in rounding"
-    )
+    of_variance = code == NO_INNOVATION_VARIANCE
+    why = "the variance of an innovation is not positive" if of_variance else "the covariance is lost in rounding"
     raise DataError(
         f"navigation broke down at {time:.3f} s, at a measurement of {source.name}: {why}; check its sigmas"
     )

@@ -26,7 +26,7 @@ from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
 from truenorth.quality.stamps import with_scatter
-from truenorth.quality.swing import shown_arm, swing, unseen_swing, with_unseen_arm
+from truenorth.quality.swing import UNSEEN_ARM, shown_arm, swing, unseen_swing, with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -55,6 +55,7 @@ class Plan:
     always: Sequence[Aiding]  # gaps and stops
     interval: float
     every: int
+    askew: float  # scale factors and misalignments of the gyros by their specification, whatever a rival's are
     slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
     factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
     swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
@@ -68,7 +69,7 @@ class Plan:
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
-        used = [*with_unseen_arm(sensors, self.record, known=self.swings), *self.always]
+        used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings), *self.always]
         return navigate_track(
             self.record,
             self.start,
@@ -107,6 +108,10 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         plan, track = _with_unseen_swing(plan, given, track, smooth)
         if plan is as_it_was:
             break
+    as_it_was = plan
+    plan, track = _with_swing_apart(plan, given, track, smooth)  # as late as it is now
+    if plan is not as_it_was:
+        plan, track = _with_unseen_swing(plan, given, track, smooth)
     for _ in range(2):  # one sensor's may hide another's
         slow, shown = slow_errors(track, plan.sources(given))
         if not slow:
@@ -123,7 +128,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
         track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES), fixes)
-        track = with_open_arm(track) if plan.unseen else track
+        track = with_open_arm(track)
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
         if receiver.mounting is not None:
@@ -138,10 +143,11 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
 def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
     """The plan whose receiver does not show its antenna's swing, where the log speaks for it, and its track; else the same ones.
 
-    First of all: of a swing that is taken for motion the filter makes delays, and loses the track.
+    First of all: of a swing that is taken for motion the filter makes delays, and loses the track. And once delays are found: of a
+    swing of another moment no part is shown.
     """
     apart, aiding = replace(plan, swings=True), plan.sources(given)
-    both = (with_unseen_arm(aiding, plan.record, known=known) for known in (False, True))
+    both = (with_unseen_arm(aiding, plan.record, plan.askew, known=known) for known in (False, True))
     if all(one.states.keys() == two.states.keys() for one, two in zip(*both, strict=True)):
         return plan, track
     try:
@@ -202,16 +208,23 @@ def _all_shown(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) ->
 
 
 def _with_unseen_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
-    """The plan with as much of an antenna's swing as noise as innovations show now, and its track, once any of it is.
+    """The plan with as much of an antenna's swing as noise as innovations show now, and its track, once a part of it is unseen.
 
-    A filter shows less of a swing the quicker it is, and the states have one part for all: that is no evidence of an arm.
+    A filter shows less of a swing the quicker it is, and the states have one part for all that is quick of a rate: what is left of
+    tones that are shown otherwise is noise, not the scale of a gyro. Of a track that was lost without it some is noise always.
     """
     receiver = given.get(Gnss.key)
-    if not plan.unseen or not isinstance(receiver, Gnss) or receiver.mounting is None:
+    if (
+        not (plan.unseen or UNSEEN_ARM in track.layout.names)
+        or not isinstance(receiver, Gnss)
+        or not (antenna := receiver.mounting)
+        or antenna.latency_sigma == 0.0
+    ):
         return plan, track
+    least = LEAST_UNSEEN if plan.unseen else 0.0
     for _ in range(NOISE_PASSES):
-        arm = shown_arm(track, receiver.mounting.lever_arm)
-        share = max(unseen_swing(track, plan.record, arm, plan.unseen), LEAST_UNSEEN)
+        arm = shown_arm(track, antenna.lever_arm)
+        share = max(unseen_swing(track, plan.record, arm, plan.unseen), least)
         if not differs(plan.unseen, share):
             break
         plan = _with_swing(plan, given, track, arm, share)

@@ -16,6 +16,7 @@ from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.core.errors import DataError, UsageError
+from truenorth.errors.axes import axis_sigma
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
@@ -207,9 +208,8 @@ def _by_specification(
     taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
     modelled = partial(_model, begin, (*errors, *deflection.groups), scale_factors, height)
-    plan = Plan(
-        record, begin, modelled(noise), height, disturbances, *_intervals(record, interval, output, damping is not None)
-    )
+    times = _intervals(record, interval, output, damping is not None)
+    plan = Plan(record, begin, modelled(noise), height, disturbances, *times, axis_sigma(noise)[0].max())
     _check_overlap(record, aiding := plan.sources(given))
     check_places(given, begin, height)
     if zupt is not None:

@@ -15,7 +15,7 @@ from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.rivals import moved
-from truenorth.quality.swing import UNSEEN_ARM
+from truenorth.quality.swing import unseen_arm
 from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
@@ -87,7 +87,7 @@ def second_look(
                 continue
             value, sigma = track.sensors[-1, where], np.hypot(track.sigma[-1, where], said)
             if role == "lever arm" and key == "gnss":
-                sigma = np.hypot(sigma, _unseen(track))
+                sigma = np.hypot(sigma, unseen_arm(track)[0])  # how its receiver filters nobody knows
             size = np.where(np.abs(value) > OPEN[role].least, np.abs(value) / sigma, 0.0)
             if np.any(size > limit("misfit")):
                 item = _contradiction(role, name, key, given, value, sigma)
@@ -102,12 +102,6 @@ def second_look(
     whole = moved(first, track)
     share = Effect(*(size / math.sqrt(len(against)) for _, size in whole.items()))
     return [replace(item, kind="known" if item.urgent else "hint", effect=share) for item in against] + found
-
-
-def _unseen(track: Track) -> Array:
-    """(3,) m: the part of the antenna's arm whose swing its receiver does not show: how it filters nobody knows."""
-    where = track.layout.slice_of(UNSEEN_ARM)
-    return np.zeros(3) if where is None else track.sensors[-1, where]
 
 
 def _contradicted(track: Track) -> float:

@@ -27,7 +27,7 @@ from truenorth.aiding.sensors import place_axes, place_sigma
 from truenorth.aiding.source import Aiding
 from truenorth.quality.aid_noise import NEWEST, white_part
 from truenorth.quality.slow_aids import FIXES, Lasting, as_lasting, says_size, slow_errors, usual_bias, with_slow
-from truenorth.quality.swing import UNSEEN_ARM
+from truenorth.quality.swing import unseen_arm
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import ANTENNA_ARM, DP
@@ -156,12 +156,13 @@ def _with_arm_of(track: Track, start: Start) -> Track:
 def with_open_arm(track: Track) -> Track:
     """The track with the place as uncertain as is the part of an estimated arm whose swing the receiver does not show.
 
-    Of a swing whose phase no state knows what is learnt of the arm upward is made of how the receiver filters.
+    What is learnt of the arm upward is made of how the receiver filters then, which is another thing for each tone of a swing.
+    The square of that part as found, less its variance: of a receiver that shows all there is nothing left.
     """
-    unseen = track.layout.slice_of(UNSEEN_ARM)
-    if unseen is None or track.layout.slice_of(ANTENNA_ARM) is None or not len(track.P):
+    if track.layout.slice_of(ANTENNA_ARM) is None or not len(track.P):
         return track
-    return _wider(track, np.tile(track.sensors[-1, unseen] ** 2, (len(track), 1)))
+    d, sigma = unseen_arm(track)
+    return _wider(track, np.tile(np.maximum(d**2 - sigma**2, 0.0), (len(track), 1)))
 
 
 def _wider(track: Track, variance: Array) -> Track:

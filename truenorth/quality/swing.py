@@ -11,9 +11,9 @@ receiver that shows nothing of the swing has a share of 1. One that shows that o
 count: so nothing is learnt where a delay is given, since one that is wrong would hide in it.
 
 The share is of an arm that is known. Of one that is estimated, the part of it whose swing is not shown is estimated with it
-(:mod:`truenorth.aiding.velocity`): the swing says nothing else of it. With the share alone the arm up of a mast of 2 m came out as
-nothing, 37 to 57 of its sigmas off. Navigation estimates that part of a known arm as well, where the log is likelier with it:
-without it, 16 of 18 drives with a mast of 2 to 9 m on rough ground lost their track.
+(:mod:`truenorth.aiding.velocity`), for the rate about each axis by itself: the swing says nothing else of it. With the share
+alone the arm up of a mast of 2 m came out as nothing, 37 to 57 of its sigmas off. Navigation estimates that part of a known arm
+as well, where the log is likelier with it: without it, 16 of 18 drives with a mast of 2 to 9 m on rough ground lost their track.
 
 The rule is ours.
 """
@@ -44,6 +44,7 @@ Array = NDArray[np.float64]
 VELOCITIES = "GNSS velocity"
 SMOOTHED = 1.0  # s, over which a receiver takes a mean, or its interval where that is shorter
 UNSEEN_ARM = "GNSS unseen arm"  # the name of its states
+LEAST = 1e-6  # m, one sigma of an arm that is nothing along an axis
 SEEN = 0.3  # of the noise of a row, from which a swing (RMS) is seen in it: a tenth of its variance
 SHARES = np.concatenate([[0.0], np.geomspace(0.1, 2.0, 40)])
 
@@ -73,11 +74,30 @@ def unseen_swing(track: Track, record: ImuRecord, arm: Array, had: float) -> flo
 
 def shown_arm(track: Track, given: Array) -> Array:
     """(3,) of an antenna, as a track has found it beyond what was given, m, without the part whose swing is not shown."""
-    arm = np.array(given, dtype=np.float64)
-    for name, sign in ((ANTENNA_ARM, 1.0), (UNSEEN_ARM, -1.0)):
-        if (there := track.layout.slice_of(name)) is not None:
-            arm += sign * track.sensors[-1, there]
+    arm = np.array(given, dtype=np.float64) - unseen_arm(track)[0]
+    if (there := track.layout.slice_of(ANTENNA_ARM)) is not None:
+        arm += track.sensors[-1, there]
     return arm
+
+
+def unseen_arm(track: Track) -> tuple[Array, Array]:
+    """(3,) m: the part of an antenna's arm whose swing is not shown, of both rates that swing it, and how well it is known."""
+    where = track.layout.slice_of(UNSEEN_ARM)
+    if where is None:
+        return np.zeros(3), np.zeros(3)
+    D = track.sensors[-1, where].reshape(3, 3)
+    weight = 1.0 / np.maximum(track.sigma[-1, where].reshape(3, 3), LEAST) ** 2
+    i, j = [1, 2, 0], [2, 0, 1]  # of k = 0, 1, 2; q x d = D q: d_k is in it with q_j along i, and with -q_i along j
+    total = weight[i, j] + weight[j, i]
+    d = (weight[i, j] * D[i, j] - weight[j, i] * D[j, i]) / total
+    return d, 1.0 / np.sqrt(total)
+
+
+def unseen_sigma(arm: Array, askew: float) -> Array:
+    """(9,) m: sigmas of D by rows: of ``q x d``, d as long as the arm, and of ``M q x l``, elements of M of `askew`, 1."""
+    of_axes = askew * np.hypot(arm[[1, 2, 0]], arm[[2, 0, 1]])
+    of_arm = np.abs(np.array([[0.0, arm[2], arm[1]], [arm[2], 0.0, arm[0]], [arm[1], arm[0], 0.0]]))
+    return np.asarray(np.hypot(of_arm, of_axes[:, None]).ravel())
 
 
 def swing(track: Track, record: ImuRecord, arm: Array, time: Array) -> Array:
@@ -92,16 +112,16 @@ def swing(track: Track, record: ImuRecord, arm: Array, time: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(np.einsum("kia,kab,kib->ki", C, covariance, C), 0.0)))
 
 
-def with_unseen_arm(aiding: Iterable[Aiding], record: ImuRecord, *, known: bool = False) -> list[Aiding]:
+def with_unseen_arm(aiding: Iterable[Aiding], record: ImuRecord, askew: float, *, known: bool = False) -> list[Aiding]:
     """The same sources; a receiver's velocities with the part of an estimated arm whose swing they do not show, among their states.
 
-    It is as long as the arm may be, along each axis. With `known`, of an arm that is known as well, where its swing is large enough
-    to be seen in a row's noise.
+    It is as long as the arm may be, along each axis; `askew`, scale factors and misalignments of the gyros, adds to it. With
+    `known`, of an arm that is known as well, where its swing is large enough to be seen in a row's noise.
     """
-    return [_smoothed(s, record, known) if s.name == VELOCITIES else s for s in aiding]
+    return [_smoothed(s, record, askew, known) if s.name == VELOCITIES else s for s in aiding]
 
 
-def _smoothed(source: Aiding, record: ImuRecord, known: bool) -> Aiding:
+def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool) -> Aiding:
     estimated = source.states.get("lever arm")
     if estimated is None and not (known and source.lever_arm.any()):
         return source
@@ -115,7 +135,7 @@ def _smoothed(source: Aiding, record: ImuRecord, known: bool) -> Aiding:
         if math.sqrt(float(np.mean(swings**2))) < SEEN * float(np.nanmedian(source.sigma)):
             return source
     arm = np.hypot(source.lever_arm, 0.0 if estimated is None else estimated.sigma)
-    unseen = Group(UNSEEN_ARM, arm, unit="m")
+    unseen = Group(UNSEEN_ARM, unseen_sigma(arm, askew), unit="m")
     measured = np.hstack([source.measured, quick])
     return replace(source, kind=SMOOTHED_VELOCITY, measured=measured, states={**source.states, "filter": unseen})
 

@@ -273,7 +273,7 @@ LIMITS: dict[str, Limit] = {
         "that a matrix of the gyros explains, which a push, or late gyros, may explain as well: it is in sigma then",
     ),
     "matrix": Limit(
-        1e-4,
+        0.01,
         "1",
         "probability that sound gyros explain as many squares by a matrix of theirs: from here on one is searched, which decides",
     ),

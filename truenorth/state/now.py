@@ -22,7 +22,8 @@ NOW_NORTH = 57  # sine and cosine of the direction of north in w (x, y)
 NOW_FORCE_W = 59  # mean specific force along w since the last event, m/s^2
 NOW_FORCE_B = 62  # the same along the body
 NOW_OTHER_RATE = 65  # w_ib_b at this very time, of noise that is independent of that of `NOW_RATE`
-NOW_LENGTH = 68
+NOW_RATE_NOISE = 68  # variance of a component of `NOW_RATE` by the gyros' white noise, (rad/s)^2
+NOW_LENGTH = 69
 
 
 @borrowing
