@@ -244,10 +244,13 @@ def noise_evidence(run: Callable[[M], Track], first: Track, model: M, record: Im
 def counted_once(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The same evidence, rivals with what coloured innovations do not add to sigma already: both see the same.
 
-    Where the model is contradicted, rivals of it say nothing more and are left out.
+    Where the model is contradicted, rivals of it say nothing more and are left out. Where heading depends on the start
+    (:mod:`truenorth.navigation.by_start`), filters differ by where each has led it, and likelihoods refuse none.
     """
     if any(item.kind == "unknown" for item in evidence):
         return [item for item in evidence if not item.key.startswith("rival.")]
+    if any(item.key == "heading.by_start" for item in evidence):
+        evidence = [replace(e, kind="hint") if e.key.startswith(("rival.", "delay.")) else e for e in evidence]
     added = NO_EFFECT
     for item in evidence:
         if item.key == "innovations.coloured":

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
-from truenorth.aiding.source import Aiding
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.axes import axis_sigma
@@ -30,6 +29,7 @@ from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
+from truenorth.navigation.by_start import start_evidence
 from truenorth.navigation.given import (
     arm_as_begun,
     by_key,
@@ -50,7 +50,7 @@ from truenorth.navigation.start import force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
-from truenorth.navigation.whereabouts import check_places
+from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.held import as_sampled
@@ -210,7 +210,7 @@ def _by_specification(
     modelled = partial(_model, begin, (*errors, *deflection.groups), scale_factors, height)
     times = _intervals(record, interval, output, damping is not None)
     plan = Plan(record, begin, modelled(noise), height, disturbances, *times, axis_sigma(noise)[0].max())
-    _check_overlap(record, aiding := plan.sources(given))
+    check_overlap(record, aiding := plan.sources(given))
     check_places(given, begin, height)
     if zupt is not None:
         tell("looking for stops")
@@ -292,7 +292,7 @@ def _rivals(
     modelled: Callable[[ImuSpec], InsModel],
     smooth: bool,
 ) -> tuple[list[Evidence], Array]:
-    """What other biases, a poorer IMU, other clocks and mountings explain better, and growth by poorer IMUs."""
+    """What other biases, a poorer IMU, other clocks and mountings explain better; growth by poorer IMUs and other starts."""
     aiding = plan.sources(given)
 
     def again(slow: Slow, model: InsModel) -> Track:
@@ -302,9 +302,11 @@ def _rivals(
     def of_record(record: ImuRecord) -> Track:
         return replace(plan, record=record).run(aiding, smooth=smooth)
 
+    def of_start(start: Start, model: InsModel = plan.model) -> Track:
+        return replace(plan, start=start, model=model).run(aiding, smooth=smooth)
+
     def of_another_imu(other: ImuSpec) -> Track:
-        start = of_poorer(plan.start, spec, other)
-        return replace(plan, start=start, model=modelled(other)).run(aiding, smooth=smooth)
+        return of_start(of_poorer(plan.start, spec, other), modelled(other))
 
     others = poorer_tracks(of_another_imu, track, spec)
     usual, without = partial(again, plan.slow), [partial(again, less) for less in one_less(plan.slow)]
@@ -319,7 +321,8 @@ def _rivals(
     found += _led_away(plan, track, given, smooth)
     found += _gyros_of_another_moment(plan, given)
     found += second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
-    return found, growth_along(track, others)
+    unsure, growth = start_evidence(of_start, plan.start, track)
+    return found + unsure, np.maximum(growth_along(track, others), growth)
 
 
 def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:
@@ -387,14 +390,3 @@ def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
         )
     first = int(np.searchsorted(record.time, start.time + slack))
     return record[first:]
-
-
-def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
-    for sensor in aiding:
-        inside = (sensor.time > record.time[0] - record.interval) & (sensor.time <= record.time[-1])
-        if not inside.any():
-            raise DataError(
-                f"{sensor.name}: runs from {sensor.time.min():.3f} s to {sensor.time.max():.3f} s, the navigated part of "
-                f"{record.source} from {record.time[0] - record.interval:.3f} s to {record.time[-1]:.3f} s: no overlap; "
-                "expected one clock: shift the aiding log onto the IMU's (`record.shifted`)"
-            )

@@ -1,19 +1,20 @@
-"""Whether a log of places and the place that was given to the alignment are of one journey; and if not, what went wrong."""
+"""Whether logs are of the time of the navigation, and places of one journey with the start; and if not, what went wrong."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Aid, Barometer, Gnss
+from truenorth.aiding.source import Aiding
 from truenorth.core.earth import ecef_from_geodetic
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
 from truenorth.navigation.given import record_of
-from truenorth.records import GnssRecord, HeightRecord
+from truenorth.records import GnssRecord, HeightRecord, ImuRecord
 from truenorth.state.layout import DP
 from truenorth.state.state import Start
 
@@ -24,6 +25,18 @@ SIGMAS = 6.0
 FASTEST, STEEPEST = 400.0, 30.0  # m/s, of a vehicle between the alignment's epoch and the fix
 LEAST_FAR, LEAST_HIGH = 200.0, 50.0  # m
 CLOSER = 0.01  # of the distance is left where a mistake is undone
+
+
+def check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
+    """Refuse measurements that all lie outside the navigated part of the log."""
+    for sensor in aiding:
+        inside = (sensor.time > record.time[0] - record.interval) & (sensor.time <= record.time[-1])
+        if not inside.any():
+            raise DataError(
+                f"{sensor.name}: runs from {sensor.time.min():.3f} s to {sensor.time.max():.3f} s, the navigated part of "
+                f"{record.source} from {record.time[0] - record.interval:.3f} s to {record.time[-1]:.3f} s: no overlap; "
+                "expected one clock: shift the aiding log onto the IMU's (`record.shifted`)"
+            )
 
 
 def check_places(given: Mapping[str, Aid], begin: Start, altitude: str) -> None:

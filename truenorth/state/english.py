@@ -213,6 +213,10 @@ SENTENCES = {
     ),
     "second_look.misfit": "the {name} fits no small scale error and mounting angle",
     "second_look.long_arm": "the lever arm of the {name} is {length:.0f} m long, and the data do not show whether it is",
+    "heading.by_start": (
+        "heading: no acceleration shows it. The filter says {sigma:angle}, but a start that is one sigma off moves it further: it "
+        "is known as its start and its gyro leave it, {grown:angle}"
+    ),
     # ---- a velocity log, for damping
     "log.contradicts": (
         "velocity log: differs from the free INS by {east:.2f} m/s east, {north:.2f} m/s north (median), {allowed:.2f} m/s is "

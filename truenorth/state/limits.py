@@ -233,6 +233,9 @@ LIMITS: dict[str, Limit] = {
     "counts at most": Limit(
         6.0, "sigma", "of one innovation, less than a step has to show: an outlier alone is no step"
     ),
+    "depends on its start": Limit(
+        1.5, "sigma", "by which starts that are one sigma off move the answer: of a linear filter never more than one"
+    ),
     # ---- velocities against positions
     "turned as one": Limit(
         0.3, "of the squares", "of displacements, that velocities which are turned as one may leave at the most"

@@ -53,6 +53,7 @@ REMEDIES = {
         "attitude matching knows the slave only as well as its mounting on the master is known; match velocity too"
     ),
     "manoeuvre": "velocity shows heading by horizontal acceleration alone; make a turn, an S-turn, a change of speed",
+    "stops": "where the vehicle stands, let stops be found (zupt)",
     "log": "check its units, axes, mounting, and whether it works",
     "log_kind": "say what kind of log it is: doppler-bottom where it sees the ground",
     "log_arm": "measure the arm from the IMU to the log, and give it",

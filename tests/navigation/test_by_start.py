@@ -1,0 +1,78 @@
+"""Heading that no acceleration shows: starts that are one sigma off move the answer by no more than its sigma."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.honesty.circling import drawn_start, received
+from tests.runs import some
+from truenorth.core.position import Position
+from truenorth.navigation import navigate
+from truenorth.navigation.by_start import UP, _moved, _shifts, start_evidence
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import Sway, Tone, simulate
+from truenorth.state.layout import BG
+from truenorth.state.track import Track
+
+DOCK = Position.from_degrees(40.0, 118.0)
+CALM = Sway(DOCK, heading=1.0, roll_tones=(Tone(0.01, 6.0, 0.2),), heading_tones=(Tone(0.03, 17.0, 0.2),))
+SWELL = Sway(DOCK, heading=1.0, roll_tones=(Tone(0.05, 6.0, 0.2),), north_tones=(Tone(0.3, 8.0, 0.2),))
+
+
+def navigated(motion, grade, duration, seed):
+    rng, spec = np.random.default_rng(seed), imu_spec(grade)
+    log = simulate(motion, rate=25.0, duration=duration, imu=spec, seed=seed)
+    answer = navigate(log.record, drawn_start(motion, spec, rng), aid=received(motion, duration, 1.0, rng), imu=spec)
+    return answer, answer.track.errors_against(Track.along(motion.states(answer.time))) / answer.track.sigma[:, :9]
+
+
+@pytest.mark.parametrize(
+    ("motion", "grade", "duration", "seed"),
+    some(
+        [(CALM, "consumer", 200.0, 3)],
+        [
+            (motion, grade, duration, seed)
+            for motion in (CALM, Sway(DOCK, heading=1.0))
+            for grade, duration in (("consumer", 200.0), ("consumer", 600.0), ("industrial", 600.0))
+            for seed in (1, 2, 3)
+        ],
+    ),
+)
+def test_heading_without_a_push_is_as_unsure_as_its_gyro(motion, grade, duration, seed):
+    """Eight sigmas off, `navigated`, or refused for scale factors 30 times as large."""
+    answer, off = navigated(motion, grade, duration, seed)
+    assert np.abs(off[:, UP]).max() < 4.0
+    assert answer.status == "navigated"
+
+
+@pytest.mark.parametrize("seed", some([1], [2, 3, 4]))
+def test_a_swell_shows_heading_and_sigma_stays(seed):
+    answer, off = navigated(SWELL, "consumer", 200.0, seed)
+    assert np.degrees(answer.track.sigma[-1, UP]) < 3.0
+    assert np.abs(off[:, UP]).max() < 4.0
+    assert not any(item.key == "heading.by_start" for item in answer.evidence)
+
+
+def test_errors_of_the_start_are_independent_and_within_its_covariance():
+    """``delta delta' <= P`` is ``delta' P^-1 delta = 1`` of each, and nothing of both; groups that are known stay as they are."""
+    rng = np.random.default_rng(1)
+    start = drawn_start(CALM, imu_spec("consumer"), rng)
+    size = np.concatenate([np.sqrt(np.diag(start.P)), [1e-3, 1e-3]])
+    A = rng.standard_normal((17, 17)) * size[:, None]
+    correlated = replace(start, P=A @ A.T)
+    shifts, of_both = _shifts(correlated)
+    whole = np.vstack([shifts, np.zeros((2, 2))])
+    np.testing.assert_allclose(whole.T @ np.linalg.solve(A @ A.T, whole), np.eye(2), atol=1e-6)
+    np.testing.assert_allclose(shifts[UP] @ shifts[UP], of_both[0, 0])
+    other = _moved(start, shifts[:, 1])
+    np.testing.assert_allclose(other.gyro_bias - start.gyro_bias, shifts[BG, 1])
+
+
+def test_a_linear_answer_is_left_as_it_is():
+    """It moves by what its covariance says of the start, and no less than none of sigma is seen."""
+    answer, _ = navigated(SWELL, "industrial", 60.0, 1)
+    start = drawn_start(SWELL, imu_spec("consumer"), np.random.default_rng(1))
+    evidence, growth = start_evidence(lambda _: answer.track, start, answer.track)
+    assert evidence == []
+    np.testing.assert_array_equal(growth, 1.0)
