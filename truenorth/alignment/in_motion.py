@@ -18,7 +18,7 @@ from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_axes import half_turn_evidence
-from truenorth.alignment.in_motion_clocks import clock_evidence
+from truenorth.alignment.in_motion_clocks import clock_evidence, on_another_clock
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.alignment.in_motion_moments import two_moments, with_swing_apart
@@ -26,7 +26,7 @@ from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
-from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, OUTPUT, MovingTask, has_fixes, in_body_axes, moving_task
+from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
 from truenorth.alignment.in_motion_untold import UNTOLD, hidden_from, of_level
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
@@ -44,7 +44,6 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.latency import rate_evidence
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
-from truenorth.estimate.other_clocks import best_clock
 from truenorth.estimate.poorer import ALONE, BIASES, poorer_evidence, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, jump_evidence, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
@@ -193,7 +192,7 @@ def _aligned(
     if any(float(factor.max()) > LOUD for factor in louder.values()):  # what it found was made of noise
         task = replace(task, factors=louder)
         found, spread = _begun(task, method, tell)
-    task, found, unsure = _on_another_clock(task, found)
+    task, found, unsure = on_another_clock(task, found)
     first, bank, number, much = found.guess, spread, 1, False
     while number < passes or ((much or not found.settled) and passes > 1 and number < passes + MORE_PASSES):
         task, much = task.learnt(found.track)
@@ -248,21 +247,6 @@ def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[
     guesses = guesses_all_round(task.record, task.odometer, task.gnss, task.wheel, task.antenna)
     best, track, spread = _best_of_bank(task, guesses, tell)
     return begun(task, guesses[best], track), spread
-
-
-def _on_another_clock(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, list[Evidence]]:
-    """Task and first pass on a receiver's clock that runs far apart from the IMU's, where the log says so; else the same."""
-    end = float(found.track.time[-1])
-    until = end if task.record.time[-1] - end > OUTPUT else None  # of a bank's log the first part
-
-    def run(antenna: Mounting) -> Track:
-        return replace(task, antenna=antenna).run(found.guess, gated=False, until=until)
-
-    best, unsure = (None, []) if task.gnss is None else best_clock(run, task.antenna, found.track)
-    if best is None:
-        return task, found, unsure
-    apart = replace(task, antenna=best.antenna)
-    return apart, begun(apart, found.guess, best.track), unsure
 
 
 def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:

@@ -9,11 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.in_motion_passes import begun, once_more
+from truenorth.alignment.in_motion_moments import two_moments
+from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
-from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
+from truenorth.alignment.in_motion_task import LATENCY_SIGMA, OUTPUT, MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.latency import SHOWN_DELAY, as_it_runs, as_stamped, counted_between, delay_of
+from truenorth.estimate.latency import SHOWN_DELAY, as_it_runs, as_stamped, best_rate, counted_between, delay_of
+from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
@@ -74,6 +76,44 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         return replace(task, record=record).run(begin, gated=gated)
 
     return found + gyro_delay_evidence(lambda record: led_by(record, record), track, task.record, led_by)
+
+
+def on_another_clock(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, list[Evidence]]:
+    """Task and first pass on a receiver's clock that runs far apart from the IMU's, where the log says so; else the same."""
+    end = float(found.track.time[-1])
+    until = end if task.record.time[-1] - end > OUTPUT else None  # of a bank's log the first part
+
+    def run(antenna: Mounting) -> Track:
+        return replace(task, antenna=antenna).run(found.guess, gated=False, until=until)
+
+    best, unsure = (None, []) if task.gnss is None else best_clock(run, task.antenna, found.track)
+    if best is None:
+        return task, found, unsure
+    apart = replace(task, antenna=best.antenna)
+    other = begun(apart, found.guess, best.track)
+    try:
+        usual, far = _to_its_end(task, found), _to_its_end(apart, other)
+    except DataError:  # the filter broke down: no explanation
+        return task, found, unsure
+    shown, likelier = best_rate(far[1]), clock_ratio(usual[1], far[1], usual[0], far[0]) > limit("rival")
+    if likelier and shown is not None and abs(far[0].clock.rate + shown[0]) > SHOWN_DELAY * shown[1]:
+        return apart, other, unsure
+    return task, found, unsure
+
+
+def _to_its_end(task: MovingTask, found: Pass) -> tuple[Mounting, Track]:
+    """Antenna and track once passes have found the delays.
+
+    Begun far from a delay of .5 s, a log fits a rate that comes near it in the end.
+    """
+    first = found.guess
+    for _ in range(MORE_PASSES):
+        task, much = task.learnt(found.track)
+        found = once_more(task, found, first)
+        if found.settled and not much:
+            break
+    task, found = two_moments(task, found, first)
+    return task.antenna, task.run(found.guess, gated=False)
 
 
 class _Opened(NamedTuple):
