@@ -2,6 +2,7 @@
 
 import contextlib
 import gzip
+import re
 import zipfile
 
 import numpy as np
@@ -316,3 +317,15 @@ def test_lines_that_a_spreadsheet_fills_up_are_no_rows(tmp_path):
     path.write_text("\n".join([*above, *(",".join(f"{x:.6f}" for x in row) for row in rows)]) + "\n")
     record = read_imu(path)
     np.testing.assert_allclose(record.accel, rows[:, 1:4], atol=1e-5)
+
+
+@pytest.mark.parametrize("broken", ["0.⁰1", "٠.١", "1.#QNAN"])
+@pytest.mark.parametrize("rows", [1, 120])
+def test_rows_of_broken_numbers_are_no_header(tmp_path, broken, rows):
+    """Of columns that only the header names: x and y were exchanged, `aligned`, 700 sigmas off."""
+    log = tmp_path / "log.csv"
+    whole = [f"{0.01 * k:.2f},0.0001,0.0002,0.0003,0.001,0.002,{0.098 + 1e-5 * (k % 7):.5f}" for k in range(1, 2001)]
+    text = [",".join([broken] * 7) if k < rows else line for k, line in enumerate(whole)]
+    log.write_text("\n".join(["time,dtheta_y,dtheta_x,dtheta_z,dvel_y,dvel_x,dvel_z", *text]), encoding="utf-8")
+    with pytest.raises(DataError, match=f"line 2: '{re.escape(broken)}' is no number"):
+        read_imu(log)

@@ -27,6 +27,8 @@ QUOTED = re.compile(r'"\s*([+-]?\d+,\d+)\s*"', re.ASCII)  # a decimal comma betw
 EITHER = ".,"  # decimal points in some columns, commas in others
 SAMPLE = 40  # lines by which the dialect is judged
 FEWEST_CELLS = 3  # of a line that may be a row of another table
+# Begins as a number does, in digits of any script, and holds no word, which a name has (``6251.133827:scaledGyroX``); ``1.#QNAN``.
+BROKEN = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:#.*|(?!.*[A-Za-z]{3}).*)")
 MOST_BELOW, MOST_ABOVE = 1, 10  # of such lines that may stand below a header, and above it: a cut row, a matrix
 
 
@@ -122,6 +124,7 @@ def notes_on_other_rows(
     DataError
         So many of them that they are rows: with the first one's line.
     """
+    _refuse_broken_rows(source, dialect, above, count)
     header = max(used, default=-1)
     notes: list[str] = []
     for below in (True, False):
@@ -143,6 +146,18 @@ def notes_on_other_rows(
             where = "lines of numbers that are no whole row" if below else "lines of numbers above the header"
             notes.append(f"{where} left out: {len(said)}, the first is line {said[0]}")
     return tuple(notes)
+
+
+def _refuse_broken_rows(source: str, dialect: Dialect, above: Sequence[tuple[int, str]], count: int) -> None:
+    """Rows whose numbers are broken are no header, and none of those that stand above the first whole row is left out."""
+    for number, line in above:
+        cells = [] if is_remark(line) else dialect.cells(line)
+        broken = [cell for cell in cells if BROKEN.fullmatch(cell) and not dialect.is_number(cell)]
+        if broken and len(cells) == count and len(broken) + sum(map(dialect.is_number, cells)) > 0.5 * count:
+            raise DataError(
+                f"{source}: line {number}: {broken[0]!r} is no number, in a row of numbers; expected digits 0 to 9: put such rows "
+                "right, or remove them"
+            )
 
 
 def _are_numbers(dialect: Dialect, cells: Sequence[str]) -> bool:
