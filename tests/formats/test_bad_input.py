@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.formats import read_imu, write_imu
+from truenorth.formats import read_imu, text, write_imu
 from truenorth.records import ImuRecord
 
 HEADER = "time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
@@ -316,3 +316,12 @@ def test_lines_that_a_spreadsheet_fills_up_are_no_rows(tmp_path):
     path.write_text("\n".join([*above, *(",".join(f"{x:.6f}" for x in row) for row in rows)]) + "\n")
     record = read_imu(path)
     np.testing.assert_allclose(record.accel, rows[:, 1:4], atol=1e-5)
+
+
+def test_a_packed_line_without_an_end_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
+    path = tmp_path / "log.csv.gz"
+    with gzip.open(path, "wb", 1) as file:
+        file.write(b"time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + bytes([48]) * (1 << 22))
+    monkeypatch.setattr(text, "text_of", lambda path: pytest.fail("unpacked"))
+    with pytest.raises(DataError, match=r"log\.csv\.gz: line 2: longer than 64 KiB"):
+        read_imu(path)
