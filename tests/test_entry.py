@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import truenorth as tn
+from tests.helpers import raises_naming
 from truenorth.aiding.source import Aiding
 from truenorth.alignment import Request
 from truenorth.alignment.transfer import align_transfer
@@ -136,3 +137,31 @@ def test_navigation_takes_an_aid_of_ones_own(still):
     aided = tn.navigate(still, start, aid=Fixes(np.arange(61.0, 119.0), PLACE), altitude="free")
     assert [r.name for r in aided.residuals] == ["station"]
     assert aided.position_sigma[-1].max() < 0.05 < free.position_sigma[-1].max()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"calibration": "x"}, ["calibration is 'x'", "expected a Calibration"]),
+        ({"at": "x"}, ["at is 'x'", "expected an epoch", "number of seconds"]),
+        ({"method": 3}, ["method is 3", "expected a name", "callable"]),
+    ],
+)
+def test_an_option_of_another_type_is_named(still, options, words):
+    with raises_naming(tn.UsageError, *words):
+        tn.align(still, PLACE, "navigation", **options)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_place_of_other_than_numbers_is_named():
+    with raises_naming(tn.UsageError, "lat is '48'", "expected a number, in rad"):
+        tn.Position("48", 0.0, 0.0)
+    with raises_naming(tn.UsageError, "lat is masked", "expected a number"):
+        tn.Position(np.ma.masked, 0.0, 0.0)
+    with raises_naming(tn.UsageError, "alt is None", "in m"):
+        tn.Position(0.8, 0.0, None)
+    with raises_naming(tn.UsageError, "'48'", "expected degrees"):
+        tn.Position.from_degrees("48", 0.0, 0.0)
+    with raises_naming(tn.UsageError, "masked", "expected a Position"):
+        tn.Position.of([48.0, np.ma.masked])
+    assert tn.Position(np.float32(0.5), np.array(0.25), np.int64(3)).alt == 3

@@ -60,6 +60,32 @@ def test_what_is_read_within_a_result_of_the_same_kind(tmp_path, capsys, monkeyp
     refused(capsys, monkeypatch, tmp_path, "simulate", tmp_path / "mine.yaml", "-o", tmp_path)
 
 
+@pytest.mark.parametrize("count", [["--runs", "2"], ["--runs=1", "--run", "1"]])
+def test_folders_of_runs(count, made, tmp_path, capsys, monkeypatch):
+    """Another kind of result, somebody's own file, or a scenario that is read, in a later run's folder: no run is written."""
+    (tmp_path / "mine.yaml").write_text(json.dumps(REST | {"duration": "5 s"}))
+    words = ["simulate", tmp_path / "mine.yaml", *count, "--no-plot", "-o"]
+    shutil.copytree(made / "start", tmp_path / "kind" / "run_0001")
+    (tmp_path / "own" / "run_0001").mkdir(parents=True)
+    (tmp_path / "own" / "run_0001" / "scenario.yaml").write_text("mine: 1")
+    (tmp_path / "log" / "run_0001").mkdir(parents=True)
+    (tmp_path / "log" / "run_0001" / "imu.parquet").write_text("")
+    for name in ("kind", "own", "log"):
+        refused(capsys, monkeypatch, tmp_path, *words, tmp_path / name)
+    code, said = run_command(capsys, monkeypatch, *words, tmp_path / "runs")
+    assert code == 0, said.err
+    words[1] = tmp_path / "runs" / "run_0001" / "scenario.yaml"
+    refused(capsys, monkeypatch, tmp_path, *words, tmp_path / "runs")
+    words[1] = tmp_path / "mine.yaml"
+    code, said = run_command(capsys, monkeypatch, *words, tmp_path / "runs")
+    assert code == 0, said.err  # of the same kind: replaced
+    code, said = run_command(
+        capsys, monkeypatch, "simulate", words[1], "--runs", "1", "--no-plot", "-o", tmp_path / "own"
+    )
+    assert code == 0, said.err  # run 0 alone: run_0001 stays as it is
+    assert (tmp_path / "own" / "run_0001" / "scenario.yaml").read_text() == "mine: 1"
+
+
 @pytest.mark.parametrize("option", ["-o {}", "-o{}", "--output {}", "--output={}", "-o elsewhere -o {}"])
 def test_a_folder_with_a_result_of_another_kind_by_any_spelling(option, made, tmp_path, capsys, monkeypatch):
     shutil.copytree(made / "start", tmp_path / "start")

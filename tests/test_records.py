@@ -253,3 +253,12 @@ def test_a_record_is_shown_in_a_line():
         np.array([1.0, 2.0]), *np.radians([[48.0, 48.0], [11.0, 11.0]]), np.array([5.0, 5.0]), source="g.csv"
     )
     assert repr(record) == "GnssRecord(g.csv: 2 rows, 1 to 2 s, 1 Hz; lat, lon, alt)"
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("scale", [1e300, 1e-300])
+def test_times_of_no_clock_are_refused(scale, kind):
+    """Squares of such intervals overflow."""
+    time = np.arange(1, 11) * 0.01
+    with pytest.raises(DataError, match=r"row 10, column time|row every 1e-302 s|row 1, column d"):
+        ImuRecord(time * scale, np.full((10, 3), 1e-3), np.full((10, 3), 0.1), kind)

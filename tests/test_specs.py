@@ -186,3 +186,23 @@ def test_positions_are_three_places_of_three_lengths():
 def test_a_name_that_no_file_can_have():
     with pytest.raises(UsageError, match="so long a name"):
         imu_spec("9" * 300)
+
+
+def test_what_no_sensor_can_be_is_refused_with_its_range(tmp_path):
+    """Squares of such numbers overflow."""
+    groups = {"gyro": {"bias": "1e200 deg/h"}, "accel": {"bias": "50 ug"}}
+    with raises_naming(DataError, "gyro.bias", "1e200 deg/h", "expected 0 to 2.06265e+11 deg/h"):
+        imu_spec(groups)
+    with raises_naming(DataError, "temperature.start", "-1e200 K", "-10000 K to 10000 K"):
+        imu_spec({"gyro": {"bias": "1 deg/h"}, "temperature": {"start": "-1e200 K"}})
+    with raises_naming(DataError, "accel.bandwidth", "1e-200 Hz", ">= 1e-06 Hz"):
+        imu_spec({"accel": {"bandwidth": "1e-200 Hz"}})
+    with raises_naming(UsageError, "accel_bias is 1e+200", "1.01972e+13 ug"):
+        ImuSpec(accel_bias=1e200)
+    with raises_naming(UsageError, "accel_positions", "100 m"):
+        ImuSpec(accel_positions=((1e200, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    for group, entries in KEYS.items():  # the ends themselves are taken, and have finite squares
+        for key, entry in entries.items():
+            low, high = entry.bounds
+            spec = ImuSpec(**{f"{group}_{key}": high if math.isfinite(high) else max(low, 1.0)})
+            assert all(math.isfinite(x) for x in spec.bias_variance)

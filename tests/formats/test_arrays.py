@@ -114,6 +114,23 @@ def test_mistakes(save, variables, columns, error, words):
         assert word in str(caught.value)
 
 
+def test_matlab_of_version_4(tmp_path):
+    path = tmp_path / "log.mat"
+    time = np.arange(50) * 0.01
+    gyro, accel = np.full((50, 3), 1e-4), np.full((50, 3), (0.0, 0.0, 9.8))
+    savemat(path, {"time": time, "gyro": gyro, "accel": accel}, format="4")
+    record = read_imu(path, units={"gyro": "rad/s"})
+    np.testing.assert_array_equal(record.time, time)
+    np.testing.assert_array_equal(record.accel, accel)
+    whole = path.read_bytes()
+    hostile = {"rows": whole[:4] + b"\xff\xff\xff\x7f" + whole[8:], "cut": whole[: len(whole) // 2], "ends": whole[:21]}
+    for name, content in hostile.items():
+        damaged = tmp_path / f"{name}.mat"
+        damaged.write_bytes(content)
+        with pytest.raises(DataError, match=rf"{name}\.mat: the MATLAB file is damaged"):
+            read_imu(damaged)
+
+
 def test_pickled_objects_are_never_loaded(tmp_path):
     np.savez(tmp_path / "log.npz", gyro=np.array([{}], dtype=object))
     with pytest.raises(DataError, match="cannot be loaded"):

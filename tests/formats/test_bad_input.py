@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.formats import read_imu, write_imu
+from truenorth.formats import read_imu, text, write_imu
 from truenorth.records import ImuRecord
 
 HEADER = "time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
@@ -325,7 +325,16 @@ def test_rows_of_broken_numbers_are_no_header(tmp_path, broken, rows):
     """Of columns that only the header names: x and y were exchanged, `aligned`, 700 sigmas off."""
     log = tmp_path / "log.csv"
     whole = [f"{0.01 * k:.2f},0.0001,0.0002,0.0003,0.001,0.002,{0.098 + 1e-5 * (k % 7):.5f}" for k in range(1, 2001)]
-    text = [",".join([broken] * 7) if k < rows else line for k, line in enumerate(whole)]
-    log.write_text("\n".join(["time,dtheta_y,dtheta_x,dtheta_z,dvel_y,dvel_x,dvel_z", *text]), encoding="utf-8")
+    lines = [",".join([broken] * 7) if k < rows else line for k, line in enumerate(whole)]
+    log.write_text("\n".join(["time,dtheta_y,dtheta_x,dtheta_z,dvel_y,dvel_x,dvel_z", *lines]), encoding="utf-8")
     with pytest.raises(DataError, match=f"line 2: '{re.escape(broken)}' is no number"):
         read_imu(log)
+
+
+def test_a_packed_line_without_an_end_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
+    path = tmp_path / "log.csv.gz"
+    with gzip.open(path, "wb", 1) as file:
+        file.write(b"time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + bytes([48]) * (1 << 22))
+    monkeypatch.setattr(text, "text_of", lambda path: pytest.fail("unpacked"))
+    with pytest.raises(DataError, match=r"log\.csv\.gz: line 2: longer than 64 KiB"):
+        read_imu(path)

@@ -208,6 +208,15 @@ def test_a_start_without_heading_is_refused(tmp_path):
         navigate(record, tmp_path)
 
 
+def test_a_start_that_is_no_alignment_is_said_to_be_none(tmp_path):
+    for content in ('{"type": "x"}', '{"scenario": "van", "seed": 0}', '{"status": "x", "heading_deg": null}'):
+        (tmp_path / "summary.json").write_text(content)
+        with pytest.raises(
+            DataError, match=r"summary\.json: this is no alignment of ours.*folder of a saved alignment"
+        ):
+            read_start(tmp_path)
+
+
 def test_wrong_input_is_found_and_said(drive, tmp_path):
     motion, record, start = drive
     time = np.arange(1.0, 179.0)

@@ -321,6 +321,8 @@ def align(
     AlignmentError
         Too short a log for any answer.
     """
+    if not isinstance(method, str) and not callable(method):
+        raise UsageError(f"method is {method!r}; expected a name, such as 'auto', or a callable")
     given = tuple(aid) if isinstance(aid, list | tuple) else (aid,)
     aids = {type(a): a for a in given}
     if len(aids) < len(given):

@@ -104,7 +104,7 @@ def check_output(words: Sequence[str]) -> list[Path]:
     if command is None:
         return []
     kept, wanted = [], KINDS[command]
-    for folder in filter(is_folder, map(Path, _outputs(words))):
+    for folder in _folders(words, command):
         found = kinds_in(folder)
         if found and wanted not in found:
             raise UsageError(
@@ -127,9 +127,9 @@ def check_names(words: Sequence[str]) -> None:
     from truenorth.core.atomic import check_free
 
     command = next((word for word in words if word in KINDS), "")
-    for folder in _outputs(words):
+    for folder in {*map(Path, _outputs(words)), *_folders(words, command)}:
         for name in FIRST.get(KINDS.get(command, ""), ()):
-            check_free(Path(folder) / name)
+            check_free(folder / name)
 
 
 def kinds_in(folder: Path) -> list[str]:
@@ -145,6 +145,29 @@ def kinds_in(folder: Path) -> list[str]:
 
 def _holds(folder: Path, names: Sequence[str]) -> bool:
     return bool(names) and all(any(folder.glob(name)) for name in names)
+
+
+def _folders(words: Sequence[str], command: str) -> Iterator[Path]:
+    """The folders that are there and that a command writes into: with ``simulate --runs`` those of its runs as well."""
+    several = command == "simulate" and any(word.partition("=")[0] == "--runs" for word in words)
+    first, count = (_number(words, option) for option in ("--run", "--runs"))
+    for folder in filter(is_folder, map(Path, _outputs(words))):
+        yield folder
+        for path in sorted(folder.glob("run_*")) if several else ():
+            number = path.name.removeprefix("run_")
+            if path.is_dir() and number.isdecimal() and int(number) in range(first, first + count):
+                yield path
+
+
+def _number(words: Sequence[str], option: str) -> int:
+    """The whole number behind an option, as the next word or behind ``=``; 0 where there is none."""
+    found = 0
+    for word, following in zip(words, (*words[1:], "")):
+        name, equals, value = word.partition("=")
+        if name == option:
+            number = value if equals else following
+            found = int(number) if number.isdecimal() else 0
+    return found
 
 
 def _outputs(words: Sequence[str]) -> Iterator[str]:

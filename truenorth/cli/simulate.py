@@ -61,23 +61,29 @@ def simulate(
     if output is None:
         raise UsageError("no output folder; name one with -o")
     from truenorth.core.atomic import writable_folder
-    from truenorth.simulation.folder import save_run
+    from truenorth.simulation.folder import check_folder, save_run
 
     writable_folder(output)  # before the work, not after it
     plot = plot and drawing()
     drawn_with = chosen.seed if seed is None else seed
+    suffix: Any = "csv" if csv else "parquet"
     numbers = range(run, run + (1 if runs is None else runs))
+    for number in numbers:  # all of them before the first is written
+        check_folder(chosen, _folder(output, runs, number), suffix, plot)
     shared = None if chosen.is_drawn or len(numbers) == 1 else chosen.ideal()
     paths: list[Path] = []
     for number in _with_bar(numbers):
         simulated = chosen.simulate(seed=drawn_with, run=number, ideal=shared)
-        folder = output if runs is None else output / f"run_{number:04d}"
-        suffix: Any = "csv" if csv else "parquet"
+        folder = _folder(output, runs, number)
         paths = save_run(chosen, simulated, folder, seed=drawn_with, run=number, suffix=suffix, plot=plot)
     if runs is None:
         print_written(paths)
     else:
         console.print(f"wrote {len(numbers)} runs into {output}", soft_wrap=True)
+
+
+def _folder(output: Path, runs: int | None, number: int) -> Path:
+    return output if runs is None else output / f"run_{number:04d}"
 
 
 def _with_bar(numbers: range) -> Iterable[int]:

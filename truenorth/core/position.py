@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from truenorth.core.errors import UsageError
+from truenorth.core.numeric import is_masked, is_number
 
 FARTHEST = 2e7  # m: half way round the earth
+UNITS = {"lat": "rad", "lon": "rad", "alt": "m", "horizontal_sigma": "m", "vertical_sigma": "m"}
 METRES_PER_RADIAN = 6_371_000.0  # mean earth radius: good enough for a position's uncertainty
 
 
@@ -28,7 +30,7 @@ class Position:
     Raises
     ------
     UsageError
-        Latitude outside +-90 deg, longitude outside +-360 deg, a height no vehicle reaches, or a negative sigma.
+        No number, latitude outside +-90 deg, longitude outside +-360 deg, a height no vehicle reaches, or a negative sigma.
     """
 
     lat: float
@@ -38,6 +40,9 @@ class Position:
     vertical_sigma: float = 20.0
 
     def __post_init__(self) -> None:
+        for name, unit in UNITS.items():
+            if not is_number(value := getattr(self, name)):
+                raise UsageError(f"a position's {name} is {value!r}; expected a number, in {unit}")
         lat, lon = math.degrees(self.lat), math.degrees(self.lon)
         if not abs(lat) <= 90.0:
             raise UsageError(f"latitude {lat:g} deg; expected -90 to 90 deg, north positive: check `lat`")
@@ -62,10 +67,9 @@ class Position:
         UsageError
             Not a number, or a latitude beyond a pole.
         """
-        try:
-            return cls(math.radians(lat), math.radians(lon), alt, **sigmas)
-        except TypeError:
-            raise UsageError(f"place {lat!r}, {lon!r}, {alt!r}; expected degrees and metres as numbers") from None
+        if not all(map(is_number, (lat, lon, alt))):
+            raise UsageError(f"place {lat!r}, {lon!r}, {alt!r}; expected degrees and metres as numbers")
+        return cls(math.radians(lat), math.radians(lon), alt, **sigmas)
 
     @classmethod
     def of(cls, place: Position | Sequence[float]) -> Position:
@@ -79,7 +83,7 @@ class Position:
         if isinstance(place, cls):
             return place
         try:
-            numbers = [float(x) for x in place]  # type: ignore[union-attr]
+            numbers = [] if any(map(is_masked, place)) else [float(x) for x in place]  # type: ignore[arg-type,union-attr]
         except (TypeError, ValueError):
             numbers = []
         if len(numbers) not in (2, 3):

@@ -9,6 +9,7 @@ from truenorth.core.errors import DataError, UsageError
 
 LARGEST = 4 << 30  # bytes of a log that is unpacked or read into memory whole
 HEAD = 1 << 16
+PIECE = 1 << 20
 REMARKS = ("#", "%", "//")  # at the beginning of a line that is no row
 REMARKS_BYTES = tuple(mark.encode() for mark in REMARKS)
 PACKED = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd", b"BZh": "bz2", b"\x04\x22\x4d\x18": "lz4"}
@@ -47,6 +48,18 @@ def first_bytes(path: Path) -> bytes:
         A damaged archive.
     """
     return _bytes(path, HEAD)
+
+
+def first_piece(path: Path) -> bytes:
+    """What a text begins with, unpacked, to be looked at before all of it is unpacked; nothing of UTF-16.
+
+    Raises
+    ------
+    DataError
+        A damaged archive.
+    """
+    piece = _bytes(path, PIECE)
+    return b"" if piece.startswith((b"\xff\xfe", b"\xfe\xff")) else piece.rstrip(b"\0")
 
 
 def all_bytes(path: Path) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -110,6 +111,8 @@ def format_of(
     if not head:
         raise DataError(f"{path.name}: the file is empty; expected {what}")
     found = next((name for beginning, name in BEGINNINGS.items() if head.startswith(beginning)), None)
+    if found is None and "mat" in (given, suffixes.get(suffix_of(path))) and _is_old_matlab(head):
+        found = "mat"
     says_little = suffix_of(path) in ANYTHING or suffixes.get(suffix_of(path)) == "csv"
     by_content = found if says_little and found in devices.DEVICES else None
     chosen = given or by_content or suffixes.get(suffix_of(path)) or found
@@ -170,6 +173,19 @@ def _has_sensors(folder: Path) -> bool:
     from truenorth.formats.sensor_folder import is_one  # which reads tables: not for every start of the command line
 
     return is_one(folder)
+
+
+def _is_old_matlab(head: bytes) -> bool:
+    """Whether a file begins as MATLAB's version 4 does: five whole numbers of either byte order."""
+    if len(head) < 20:
+        return False
+    for order, machine in (("<", 0), (">", 1)):
+        kind, *sizes, is_complex, name = struct.unpack(f"{order}5i", head[:20])
+        thousands, rest = divmod(kind, 1000)  # MOPT: machine, zero, precision, matrix
+        digits = rest // 100 == 0 and rest // 10 <= 5 and rest % 10 <= 2
+        if thousands == machine and digits and min(sizes) >= 0 and is_complex in (0, 1) and 1 < name <= 64:
+            return True
+    return False
 
 
 def _is_npz(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""MATLAB .mat up to version 7: arrays by name, fields of structs as ``trj.imu``; those of toolboxes without being asked.
+"""MATLAB .mat of versions 4 to 7: arrays by name, fields of structs as ``trj.imu``; those of toolboxes without being asked.
 
 SciPy's reader follows pointers of the file without a check, and ends the interpreter on some damaged ones: it runs in a
 process of its own.

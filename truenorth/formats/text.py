@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
-from truenorth.formats.content import REMARKS_BYTES, text_of
+from truenorth.formats.content import REMARKS_BYTES, first_piece, text_of
 from truenorth.formats.dialect import (
     DELIMITERS,
     EITHER,
@@ -204,6 +204,7 @@ def open_table(path: Path) -> TextTable:
     DataError
         No line of numbers, lines that fit no dialect, or a header of another number of columns.
     """
+    _head(path, first_piece(path))  # a line of gigabytes is refused before they are unpacked
     text, note = text_of(path)
     text, joined = without_ends_in_quotes(text)
     text = _with_stamps_apart(without_outer_quotes(text))

@@ -254,7 +254,7 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
     Raises
     ------
     DataError
-        No summary.json in it, or one that lacks what navigation needs.
+        No summary.json in it, one of something else, or one that lacks what navigation needs.
     AlignmentError
         The alignment has no heading that may be used.
     """
@@ -264,6 +264,10 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         s = read_object(path)
     except DataError as error:
         raise DataError(f"{error}; expected the folder of a saved alignment") from None
+    if missing := [name for name in ALIGNED if name not in s]:
+        raise DataError(
+            f"{path}: this is no alignment of ours, it has no {missing[0]}; expected the folder of a saved alignment"
+        )
     if s.get("heading_deg") is None:
         raise AlignmentError(
             f"{path}: the alignment is {s.get('status')!r}, it holds no heading that may be used; navigation needs one: align "
@@ -310,6 +314,7 @@ def _finite(numbers: Any) -> Array:
     return found
 
 
+ALIGNED = ("status", "method", "heading_deg", "pitch_deg")  # in the summary of any alignment of ours
 ARRAYS = (
     "C_nb",
     "phi_covariance",

@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.errors import UsageError
+from truenorth.core.numeric import is_number
 from truenorth.core.remembered import remembered
 from truenorth.quality.repeats import repeats_of
 from truenorth.quality.sampling import Finding
@@ -45,7 +47,15 @@ def as_sampled(record: Any) -> ImuRecord:
 
 
 def epoch_sampled(at: float | None, record: Any, sampled: ImuRecord) -> float | None:
-    """An epoch in the rows that are held at the end of a log: after the last sample it is that sample's."""
+    """An epoch in the rows that are held at the end of a log: after the last sample it is that sample's.
+
+    Raises
+    ------
+    UsageError
+        No number.
+    """
+    if at is not None and not is_number(at):
+        raise UsageError(f"at is {at!r}; expected an epoch on the record's clock, a number of seconds")
     last = float(sampled.time[-1])
     return last if at is not None and last < at <= float(ImuRecord.of(record).time[-1]) else at
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[np.float64]
+LATEST = 1e20  # s: more than any clock counts, were it nanoseconds of our era
 GAP_FACTOR = 1.5  # a step of more than 1.5 nominal intervals has lost at least one sample
 
 
@@ -357,6 +358,12 @@ def first_disorder(time: Array) -> tuple[int, str] | None:
 
 def _check_time(time: Array, source: str) -> None:
     if _increases(time):
+        k = int(abs(time[0]) <= abs(time[-1])) * (len(time) - 1)
+        if abs(time[k]) > LATEST:
+            raise DataError(
+                f"{source}: row {k + 1}, column time: {time[k]:g}; expected seconds, {LATEST:g} at most: convert the clock's "
+                "unit, or repair the row"
+            )
         return
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:

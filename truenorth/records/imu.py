@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 # rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
 LARGEST = {"gyro": 1e6, "accel": 1e8}
 SLOWEST = 1.0  # s between two rows
+FASTEST = 1e-9  # s between two rows
 # Numbers whose squares BLAS adds up in one thread: for more it wakes others, which go on spinning for longer than the sum takes.
 IN_ONE_THREAD = 10_000
 Kind = Literal["rates", "increments"]
@@ -70,6 +71,11 @@ class ImuRecord(Record):
         if not isinstance(self.kind, str) or self.kind not in COLUMNS:
             raise DataError(f"{self.source}: kind {self.kind!r} is not known; use 'rates' or 'increments'")
         super().__post_init__()
+        if self.interval < FASTEST:
+            raise DataError(
+                f"{self.source}: a row every {self.interval:.4g} s; expected {FASTEST:g} s or more: time is probably in another "
+                "unit; convert it to seconds"
+            )
 
     def _check_numbers(self, name: str, columns: Sequence[str]) -> None:
         """Refuse what is not finite, and what no sensor measures."""

@@ -7,6 +7,32 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from truenorth.core.units import format as format_quantity
+
+# In SI, by dimension: what no sensor that measures anything is beyond. Rates and accelerations are as far as a log's may go
+# (truenorth.records.imu); in a second or with one kelvin an error does not grow by more than that.
+MOST = {
+    "angular_rate": 1e6,
+    "angle_random_walk": 1e6,
+    "rate_random_walk": 1e6,
+    "rate_per_acceleration": 1e6,
+    "rate_per_temperature": 1e6,
+    "acceleration": 1e8,
+    "velocity_random_walk": 1e8,
+    "acceleration_random_walk": 1e8,
+    "acceleration_per_temperature": 1e8,
+    "speed": 1e8,
+    "ratio": 100.0,  # where 1 is all that is measured
+    "ratio_per_temperature": 100.0,
+    "angle": 2.0 * math.pi,
+    "time": 3600.0,  # of a latency
+    "temperature": 1e4,
+    "temperature_rate": 1e4,
+}
+BEYOND = 1e12  # times that: what several terms and a log together may make of one, and no square overflows
+FARTHEST = 100.0  # m, of an accelerometer from the centre of its IMU
+SLOWEST = 1e-6  # Hz: a sensor that takes eleven days for a turn
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -15,6 +41,27 @@ class Entry:
     dimension: str
     unit: str
     least: Literal["zero", "above zero", "finite"] = "zero"
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the largest value that a sensor can have, in SI."""
+        if self.least == "above zero":
+            return SLOWEST if self.dimension == "frequency" else 0.0, math.inf
+        most = MOST[self.dimension]
+        return -most if self.least == "finite" else 0.0, most
+
+    @property
+    def range(self) -> str:
+        """The bounds in the unit of a file."""
+        low, high = self.bounds
+        if math.isinf(high):
+            return f">= {format_quantity(low, self.unit)}"
+        return f"{format_quantity(low, self.unit) if low else 0} to {format_quantity(high, self.unit)}"
+
+    def holds(self, value: float, times: float = 1.0) -> bool:
+        """Whether a sensor can have a value, or one so many times as large."""
+        low, high = self.bounds
+        return low / times <= value / times <= high
 
     def allows(self, value: float) -> bool:
         """Whether a value in SI makes sense."""

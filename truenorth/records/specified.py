@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.errors import UsageError
 from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.records.calibration import Calibration
 from truenorth.records.imu import ImuRecord
@@ -64,8 +65,17 @@ def corrected(record: ImuRecord, spec: ImuSpec | None, calibration: Calibration 
         Lags of its sensors and places of its accelerometers; None: nothing is known of them.
     calibration : Calibration, optional
         Known biases, scale factors and misalignments, taken off first.
+
+    Raises
+    ------
+    UsageError
+        The calibration is none.
     """
     if calibration is not None:
+        if not isinstance(calibration, Calibration):
+            raise UsageError(
+                f"calibration is {calibration!r}; expected a Calibration, such as Calibration.from_file('calibration.yaml')"
+            )
         record = calibration.apply(record)
     return record if spec is None else _in_the_centre(at_its_time(record, spec), spec)
 

@@ -32,7 +32,18 @@ from truenorth.core.paths import as_path
 from truenorth.core.units import format as format_quantity
 from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
 from truenorth.records.presets import PRESETS
-from truenorth.records.spec_keys import CORRELATION_TIME, ENTRIES, KEYS, PLAIN, WANTED, Entry, field_of, unnamed
+from truenorth.records.spec_keys import (
+    BEYOND,
+    CORRELATION_TIME,
+    ENTRIES,
+    FARTHEST,
+    KEYS,
+    PLAIN,
+    WANTED,
+    Entry,
+    field_of,
+    unnamed,
+)
 from truenorth.records.vibration import coning_left
 
 if TYPE_CHECKING:
@@ -143,14 +154,17 @@ class ImuSpec:
             value = getattr(self, name)
             if not entry.allows(value):
                 raise UsageError(f"{where}: {name} is {value}; expected {WANTED[entry.least]}")
+            if not entry.holds(value, BEYOND):
+                raise UsageError(f"{where}: {name} is {value:g} in SI; expected {entry.range}: check its unit")
         for name in ("gyro_filter_order", "accel_filter_order"):
             if getattr(self, name) not in (1, 2):
                 raise UsageError(f"{where}: {name} is {getattr(self, name)}; expected 1 or 2")
         if self.accel_positions is not None:
             places = [tuple(place) for place in self.accel_positions]
-            if [len(place) for place in places] != [3, 3, 3] or not all(math.isfinite(x) for p in places for x in p):
+            if [len(place) for place in places] != [3, 3, 3] or not all(abs(x) <= FARTHEST for p in places for x in p):
                 raise UsageError(
-                    f"{where}: accel_positions is {self.accel_positions}; expected three places of three lengths"
+                    f"{where}: accel_positions is {self.accel_positions}; expected three places of three lengths up to "
+                    f"{FARTHEST:g} m"
                 )
             object.__setattr__(self, "accel_positions", tuple(places))
 
@@ -356,6 +370,8 @@ def _value(text: Any, entry: Entry, where: str) -> float:
         if entry.least == "zero":
             raise DataError(f"{where}: {text!r} is negative; expected a one-sigma value, zero or more")
         raise DataError(f"{where}: {text!r}; expected {WANTED[entry.least]}")
+    if not entry.holds(value):
+        raise DataError(f"{where}: {text!r}; expected {entry.range}: check its unit")
     return value
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from truenorth.core.atomic import atomic_files, writable_folder
+from truenorth.core.atomic import atomic_files, check_free, writable_folder
 from truenorth.core.version import __version__
 from truenorth.formats import write_imu, write_record
 
@@ -21,6 +21,24 @@ if TYPE_CHECKING:
     from truenorth.simulation.scenario import Scenario
 
 Suffix = Literal["parquet", "csv"]
+FILES, NOTES, FIGURE = ("imu", "truth"), ("scenario.yaml", "summary.json"), "figure.png"
+INDEXED = ("encoder", "truth_body")  # with an indexer
+
+
+def check_folder(scenario: Scenario, folder: Path, suffix: Suffix, plot: bool) -> None:
+    """Refuse, before the work, a folder that will not take a run.
+
+    Raises
+    ------
+    UsageError
+        It cannot be written to, or a file in it is to be kept.
+    """
+    if not folder.exists():
+        return
+    writable_folder(folder)
+    names = [*FILES, *scenario.aiding_specs, *(INDEXED if scenario.indexer is not None else ())]
+    for name in (*(f"{name}.{suffix}" for name in names), *NOTES, *((FIGURE,) if plot else ())):
+        check_free(folder / name)
 
 
 def save_run(
@@ -48,8 +66,7 @@ def save_run(
     if scenario.indexer is not None:  # truth is the IMU's; next to it that of the body in which it turns
         body = scenario.build_motion(seed, run)
         records["truth_body"] = body.states(simulation.record.time).trajectory()
-    names = [f"imu.{suffix}", f"truth.{suffix}", "scenario.yaml", "summary.json"]
-    names += [f"{key}.{suffix}" for key in records]
+    names = [f"{name}.{suffix}" for name in FILES] + [*NOTES] + [f"{key}.{suffix}" for key in records]
     paths = [target / name for name in names]
     with atomic_files() as file:
         imu, truth, resolved, summary, *others = [file(path) for path in paths]
@@ -62,7 +79,7 @@ def save_run(
         facts = json.dumps(_facts(scenario, simulation, aiding, seed, run), indent=2, allow_nan=False)
         summary.write_text(f"{facts}\n", encoding="utf-8")
         if plot:
-            paths.append(target / "figure.png")
+            paths.append(target / FIGURE)
             title = f"{scenario.name}, run {run}, seed {seed}, IMU: {scenario.imu_spec.name}"
             simulation.plot(title=title, aiding=aiding).savefig(file(paths[-1]))
     return paths
