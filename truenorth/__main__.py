@@ -50,7 +50,12 @@ def _details() -> str:
 
     try:
         with tempfile.NamedTemporaryFile(
-            "w", prefix="truenorth-error-", suffix=".txt", delete=False, encoding="utf-8"
+            "w",
+            prefix="truenorth-error-",
+            suffix=".txt",
+            delete=False,
+            encoding="utf-8",
+            errors="backslashreplace",  # of the names of files
         ) as file:
             file.write(f"{' '.join(sys.argv)}\n\n{traceback.format_exc()}")
     except OSError:

@@ -69,6 +69,16 @@ def test_errors_of_the_start_are_independent_and_within_its_covariance():
     np.testing.assert_allclose(other.gyro_bias - start.gyro_bias, shifts[BG, 1])
 
 
+def test_a_heading_that_its_gyro_alone_has_turned_is_one_error():
+    start = drawn_start(CALM, imu_spec("consumer"), np.random.default_rng(1))
+    for row in (300.0 * -start.C_nb[2], np.zeros(3)):  # 300 s by the gyro; known
+        J = np.eye(15)
+        J[UP], J[UP, BG] = 0.0, row
+        shifts, of_both = _shifts(replace(start, P=J @ start.P @ J.T))
+        np.testing.assert_allclose(shifts[UP] @ shifts[UP], of_both[0, 0], rtol=1e-9)
+        assert np.sum(np.linalg.norm(shifts, axis=0) > 0.0) == 1
+
+
 def test_a_linear_answer_is_left_as_it_is():
     """It moves by what its covariance says of the start, and no less than none of sigma is seen."""
     answer, _ = navigated(SWELL, "industrial", 60.0, 1)

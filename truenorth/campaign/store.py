@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from truenorth.core.atomic import atomic_path, writable_folder
+from truenorth.core.arrow import arrow_file
+from truenorth.core.atomic import atomic_path, writable_folder, write_text
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.json_file import read_object
 from truenorth.core.version import __version__
@@ -81,8 +82,8 @@ class Store:
         """Write a block's rows, whole or not at all."""
         import pyarrow.parquet as pq
 
-        with atomic_path(self.runs / block.shard) as temporary:
-            pq.write_table(table, temporary)
+        with atomic_path(self.runs / block.shard) as temporary, arrow_file(temporary, "wb") as file:
+            pq.write_table(table, file)
 
     def table(self, runs: int | None = None) -> pd.DataFrame:
         """All rows, in the order of cases, runs, methods and times as they were planned; those of the first `runs` runs.
@@ -165,7 +166,7 @@ def _claim(store: Store, plan: Plan) -> None:
     kept = folder / "plan.yaml"
     if not (kept.is_file() and kept.read_text(encoding="utf-8") == text):  # it may be the plan that was read
         with atomic_path(kept) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            write_text(temporary, text)
     if not manifest.is_file():
         facts = {
             "plan_sha256": plan.fingerprint,
@@ -221,7 +222,8 @@ def read_table(folder: str | os.PathLike[str], runs: int | None = None) -> pd.Da
     tables = []
     for path in sorted((Path(folder) / "runs").glob("case*.parquet")):
         try:
-            tables.append(pq.read_table(path).cast(SCHEMA))
+            with arrow_file(path) as file:
+                tables.append(pq.read_table(file).cast(SCHEMA))
         except (pa.ArrowException, OSError) as error:
             raise DataError(f"{path}: the shard is damaged ({error}); remove it and run the campaign again") from None
     if not tables:

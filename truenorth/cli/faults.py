@@ -42,7 +42,7 @@ def faults(
 
     from truenorth.campaign.fault_pages import keeper, page, read_trials
     from truenorth.campaign.faults import OUTCOMES, run_faults, table
-    from truenorth.core.atomic import atomic_files, writable_folder
+    from truenorth.core.atomic import atomic_files, writable_folder, write_text
     from truenorth.core.errors import UsageError
     from truenorth.core.paths import is_file
 
@@ -68,7 +68,7 @@ def faults(
         with atomic_files() as file:
             pd.DataFrame(table(whole)).to_csv(file(folder / "faults.csv"), index=False)
             text = page(whole, [] if before is None else read_trials(before))
-            file(folder / "faults.md").write_text(text, encoding="utf-8")
+            write_text(file(folder / "faults.md"), text)
         print_written(folder / name for name in ("trials.csv", "faults.csv", "faults.md"))
     if any(row["silent"] or row["crash"] for row in rows):
         raise typer.Exit(1)

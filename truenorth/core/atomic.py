@@ -95,6 +95,11 @@ def writable_folder(folder: str | os.PathLike[str]) -> Path:
     return path
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write text as UTF-8; other bytes of a file's name are shown by their numbers."""
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
 @contextmanager
 def atomic_path(target: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path in the folder of `target`; rename it to `target` on success, remove it on any failure.

@@ -154,12 +154,12 @@ def save(result: Any, folder: str | PathLike[str]) -> list[Path]:
         A type that nothing writes, or a folder that cannot be written to.
     """
     from truenorth.core.archive import write_archive
-    from truenorth.core.atomic import atomic_files, writable_folder
+    from truenorth.core.atomic import atomic_files, writable_folder, write_text
 
     views = views_of(result)
     files: dict[str, Write | None] = dict(_view(result, "files")(result))
     if views.page is not None:
-        files[REPORT] = lambda path: path.write_text(_function(views.page)(result), encoding="utf-8")
+        files[REPORT] = lambda path: write_text(path, _function(views.page)(result))
     if views.archive:
         files[ARCHIVE] = lambda path: write_archive(result, path)
     target = writable_folder(folder)

@@ -71,7 +71,7 @@ def write_layout(
     """
     import yaml
 
-    from truenorth.core.atomic import atomic_path
+    from truenorth.core.atomic import atomic_path, write_text
 
     target = Path(path).with_suffix(".yaml") if target is None else Path(target)
     if target.suffix.lower() != ".yaml":
@@ -84,7 +84,7 @@ def write_layout(
             "`replace=True`"
         )
     with atomic_path(target) as temporary:
-        temporary.write_text(yaml.safe_dump(layout_of(record.taken_for), sort_keys=False, allow_unicode=True), "utf-8")
+        write_text(temporary, yaml.safe_dump(layout_of(record.taken_for), sort_keys=False, allow_unicode=True))
     return target
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.arrow import arrow_file
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.columns import Columns
@@ -38,11 +39,12 @@ def columns(path: Path, format: str) -> Columns:
     def opened(path: Path) -> Iterator[Any]:
         """A Parquet file; of a Feather file its columns."""
         try:
-            if format == "feather":
-                yield pf.read_table(path)
-            else:
-                with pq.ParquetFile(path) as file:
-                    yield file
+            with arrow_file(path) as raw:
+                if format == "feather":
+                    yield pf.read_table(raw)
+                else:
+                    with pq.ParquetFile(raw) as file:
+                        yield file
         except (pa.ArrowException, OSError) as error:
             what = format.capitalize()
             raise DataError(f"{path.name}: the {what} file is damaged or cut short ({error}); write it anew") from None
@@ -92,4 +94,5 @@ def write(record: Record, path: Path) -> None:
     """Write a record with the documented columns."""
     import pyarrow.parquet as pq
 
-    pq.write_table(table_of(record), path)
+    with arrow_file(path, "wb") as file:
+        pq.write_table(table_of(record), file)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.arrow import arrow_file
 from truenorth.core.atomic import atomic_path, writable_folder
 from truenorth.core.errors import DataError, UsageError
 from truenorth.live.feed import Feed
@@ -46,8 +47,8 @@ class Parts:
     def write(self, table: pd.DataFrame) -> None:
         """Another one."""
         self._count += 1
-        with atomic_path(self._folder / f"{self._count:06d}.parquet") as temporary:
-            table.to_parquet(temporary)
+        with atomic_path(self._folder / f"{self._count:06d}.parquet") as temporary, arrow_file(temporary, "wb") as file:
+            table.to_parquet(file)
 
 
 class AidJournal:
@@ -164,7 +165,8 @@ def _read(path: Path) -> pd.DataFrame:
     import pandas as pd
 
     try:
-        return pd.read_parquet(path)
+        with arrow_file(path) as file:
+            return pd.read_parquet(file)
     except Exception as error:  # whatever a damaged file raises
         raise _damaged(path, error) from None
 

@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 
 UP = PHI.start + 2
 LINEAR = 0.1  # rad: of a turn within it the errors are linear to half a per cent
+ROUNDING = 1e-9  # of a correlation
 SEEN = 0.5  # of sigma: where answers differ by less, the log has shown heading
 
 
@@ -109,8 +110,13 @@ def _shifts(start: Start) -> tuple[Array, Array]:
     A = np.zeros((2, STATES))
     A[0, UP], A[1, BG] = 1.0, -start.C_nb[2]  # heading's error grows by minus that of the gyro
     of_both = A @ P @ A.T
-    root = np.linalg.cholesky(of_both + 1e-30 * np.eye(2))
-    return np.linalg.solve(root, A @ P).T, of_both
+    size = np.sqrt(np.maximum(np.diag(of_both), 0.0))
+    scale = np.where(size > 0.0, size, 1.0)
+    values, ways = np.linalg.eigh(
+        of_both / np.outer(scale, scale)
+    )  # heading may be known, or all of its error be the gyro's
+    seen = np.where(values > ROUNDING, values, np.inf)
+    return P @ (A / scale[:, None]).T @ ways / np.sqrt(seen), of_both
 
 
 def _moved(start: Start, x: Array) -> Start:

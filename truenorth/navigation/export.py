@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.atomic import atomic_path
+from truenorth.core.atomic import atomic_path, write_text
 from truenorth.core.errors import UsageError
 
 POINTS = 10_000  # of a line; more than a map shows
@@ -46,7 +46,7 @@ def export(result: Exported, path: Path) -> Path:
         raise UsageError(f"{path}: the suffix {path.suffix!r} is not known; expected one of {', '.join(writers)}")
     text = writers[path.suffix.lower()](result)
     with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        write_text(temporary, text)
     return path
 
 

@@ -21,7 +21,7 @@ def write_kalibr(spec: ImuSpec, rate: float, path: str | PathLike[str]) -> None:
     """
     import yaml
 
-    from truenorth.core.atomic import atomic_path
+    from truenorth.core.atomic import atomic_path, write_text
 
     whole = spec.with_random_walks(1.0 / rate)
     drive = math.sqrt(2.0 / spec.correlation_time)
@@ -34,4 +34,4 @@ def write_kalibr(spec: ImuSpec, rate: float, path: str | PathLike[str]) -> None:
         content[theirs] = float(value)
     content |= {"rostopic": "/imu", "update_rate": float(rate)}
     with atomic_path(path) as temporary:
-        temporary.write_text(yaml.safe_dump(content, sort_keys=False), "utf-8")
+        write_text(temporary, yaml.safe_dump(content, sort_keys=False))

@@ -266,10 +266,10 @@ class ImuSpec:
         """
         import yaml
 
-        from truenorth.core.atomic import atomic_path
+        from truenorth.core.atomic import atomic_path, write_text
 
         with atomic_path(path) as temporary:
-            temporary.write_text(yaml.safe_dump(self.to_mapping(), sort_keys=False, allow_unicode=True), "utf-8")
+            write_text(temporary, yaml.safe_dump(self.to_mapping(), sort_keys=False, allow_unicode=True))
 
 
 def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSpec:

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from truenorth.core.atomic import atomic_path
+from truenorth.core.atomic import atomic_path, write_text
 from truenorth.core.shown import page_of
 
 __all__ = ["write_report"]
@@ -27,5 +27,5 @@ def write_report(result: Any, path: str | PathLike[str]) -> Path:
     """
     target = Path(path)
     with atomic_path(target) as temporary:
-        temporary.write_text(page_of(result), encoding="utf-8")
+        write_text(temporary, page_of(result))
     return target

@@ -6,6 +6,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from truenorth.core.atomic import write_text
 from truenorth.core.language import translated as _
 from truenorth.core.shown import Write
 from truenorth.report.campaign_charts import campaign_panels, findings
@@ -51,7 +52,7 @@ def campaign_files(campaign: Campaign) -> dict[str, Write]:
         from truenorth.figures.campaign import plot_campaign
 
         files |= {f"{name}.png": figure.savefig for name, figure in plot_campaign(campaign).items()}
-    files["report.html"] = lambda path: path.write_text(campaign_page(campaign, tables), encoding="utf-8")
+    files["report.html"] = lambda path: write_text(path, campaign_page(campaign, tables))
     return files
 
 

@@ -105,7 +105,7 @@ def coded(text: str) -> Any:
 
 def packed(text: str) -> str:
     """Text deflated (zlib's format), as base64: what the page's script unpacks before it draws."""
-    return b64encode(zlib.compress(text.encode(), 9)).decode()
+    return b64encode(zlib.compress(text.encode(errors="backslashreplace"), 9)).decode()
 
 
 @cache

@@ -6,12 +6,16 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from truenorth.core.arrow import arrow_file
+from truenorth.core.atomic import write_text
 from truenorth.core.shown import Write, can_draw, plot
 from truenorth.formats.arrow import table_from
 from truenorth.navigation.export import geojson
 from truenorth.navigation.start import navigation_block
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from truenorth.alignment import Alignment
     from truenorth.campaign.tuning import Tuned
     from truenorth.navigation import Navigation
@@ -31,7 +35,8 @@ def _history(result: Alignment) -> Write:
     def write(path: Path) -> None:
         import pyarrow.parquet as pq
 
-        pq.write_table(table_from(result.history_columns(), index="time"), path)
+        with arrow_file(path, "wb") as file:
+            pq.write_table(table_from(result.history_columns(), index="time"), file)
 
     return write
 
@@ -40,10 +45,15 @@ def navigation_files(result: Navigation) -> dict[str, Write]:
     """summary.json, track.parquet, innovations.parquet and track.geojson."""
     return {
         "summary.json": _json(result.summary()),
-        "track.parquet": lambda path: result.to_frame().to_parquet(path),
-        "innovations.parquet": lambda path: result.innovations().to_parquet(path),
-        "track.geojson": lambda path: path.write_text(geojson(result), encoding="utf-8"),
+        "track.parquet": lambda path: _parquet(result.to_frame(), path),
+        "innovations.parquet": lambda path: _parquet(result.innovations(), path),
+        "track.geojson": lambda path: write_text(path, geojson(result)),
     }
+
+
+def _parquet(frame: pd.DataFrame, path: Path) -> None:
+    with arrow_file(path, "wb") as file:
+        frame.to_parquet(file)
 
 
 def inspection_files(result: Inspection) -> dict[str, Write]:
@@ -77,4 +87,4 @@ def tuned_files(result: Tuned) -> dict[str, Write]:
 
 
 def _json(content: dict[str, Any]) -> Write:
-    return lambda path: path.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return lambda path: write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")

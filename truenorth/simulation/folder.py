@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from truenorth.core.atomic import atomic_files, check_free, writable_folder
+from truenorth.core.atomic import atomic_files, check_free, writable_folder, write_text
 from truenorth.core.version import __version__
 from truenorth.formats import write_imu, write_record
 
@@ -75,7 +75,7 @@ def save_run(
             write_record(record, path)
         write_record(simulation.truth.trajectory(), truth)
         text = yaml.safe_dump(scenario.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
-        resolved.write_text(text, encoding="utf-8")
+        write_text(resolved, text)
         facts = json.dumps(_facts(scenario, simulation, aiding, seed, run), indent=2, allow_nan=False)
         summary.write_text(f"{facts}\n", encoding="utf-8")
         if plot:
