@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests import test_cli
+from tests.helpers import run_command
 
 ROOT = Path(__file__).parents[1]
 WHERE, log, start = test_cli.WHERE, test_cli.log, test_cli.start
@@ -93,6 +94,29 @@ def test_interrupted_writing_leaves_nothing(tmp_path, monkeypatch):
     done = subprocess.run([sys.executable, "-c", code], check=False, env=dict(os.environ))
     assert done.returncode == -9
     assert not target.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("Unable to allocate 7.45 GiB for an array with shape (1000000000,)", "asked for 7.45 GiB of memory"),
+        ("Unable to allocate 824. MiB for an array with shape (108000000,)", "asked for 824 MiB of memory"),
+        ("malloc of size 8589934592 failed", "asked for 8 GiB of memory"),
+        ("", "needs more memory than is free"),
+    ],
+)
+def test_short_memory_is_one_message_and_no_defect_of_ours(capsys, monkeypatch, tmp_path, text, said):
+    def greedy(*_args, **_options):
+        raise MemoryError(text)
+
+    monkeypatch.setattr("truenorth.simulation.folder.save_run", greedy)
+    code, out = run_command(capsys, monkeypatch, "simulate", "static_kalman", "-o", str(tmp_path))
+    assert code == 3
+    assert out.err.startswith(f"truenorth: `simulate` {said}")
+    assert out.err.endswith("free memory\n")
+    code, out = run_command(capsys, monkeypatch, "--lang", "zh", "simulate", "static_kalman", "-o", str(tmp_path))
+    assert code == 3
+    assert "内存" in out.err
 
 
 def test_an_interrupt_that_python_loses_comes_again():

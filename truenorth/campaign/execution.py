@@ -5,19 +5,26 @@ from __future__ import annotations
 import os
 import platform
 import signal
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from truenorth.campaign.plan import Plan, read_plan
 from truenorth.campaign.store import Block, other_versions, versions
 from truenorth.core.errors import UsageError
 from truenorth.core.worker import begin
 
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
+
+Done = Generator[tuple[Block, Any], None, None]  # to be closed: the workers end with it
 AHEAD = 2  # blocks under way for each worker: memory stays bounded, and no worker waits
+PATIENCE = 2.0  # s: for processes to end in
 ATTEMPTS = 3  # for a block whose worker was lost
 # Each worker is one thread: more would only get in each other's way.
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
@@ -58,14 +65,14 @@ def _plan_of(frozen: _Frozen) -> Plan:
     return read_plan(frozen.mapping)
 
 
-def in_this_process(plan: Plan, blocks: Sequence[Block]) -> Iterator[tuple[Block, Any]]:
+def in_this_process(plan: Plan, blocks: Sequence[Block]) -> Done:
     """Blocks with their tables, one after the other."""
     mapping = plan.to_mapping()
     for block in blocks:
         yield block, work(mapping, block)
 
 
-def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[tuple[Block, Any]]:
+def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Done:
     """Blocks with their tables as they are done, by processes of this machine.
 
     A worker that dies takes the pool with it: a new pool goes on with what was under way.
@@ -104,31 +111,87 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
 
 @contextmanager
 def pool_of(workers: int, *modules: str) -> Iterator[ProcessPoolExecutor]:
-    """A pool of spawned processes, which load modules first; an interrupt does not wait for the blocks under way."""
+    """A pool of spawned processes, which load modules first.
+
+    An error or an interrupt ends them at once, whatever they are at. A second interrupt meanwhile (the terminal, and `timeout`, may
+    send two) is held off until they are gone.
+    """
     import multiprocessing
 
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=begin, initargs=modules)
     try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        try:
+            yield pool
+            pool.shutdown(wait=True, cancel_futures=True)
+        except BaseException:
+            _end(pool)
+            raise
+    except BaseException:  # interrupted again, before the lines above could hold it off
+        _end(pool)
+        raise
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool and wait until they are gone, for a short time only; once more does nothing.
+
+    Without this, one that has just started waits for work that nobody sends, and Python waits for it at its own end.
+    """
+    with uninterrupted():
+        processes = list((getattr(pool, "_processes", None) or {}).values())
+        manager = getattr(pool, "_executor_manager_thread", None)
+        results = getattr(getattr(pool, "_result_queue", None), "_writer", None)
+        pool.shutdown(wait=False, cancel_futures=True)
+        for end in ("terminate", "kill"):
+            for process in processes:
+                getattr(process, end)()
+            if _gone(processes, PATIENCE):
+                break
+        if results is not None:
+            with suppress(OSError):
+                results.close()  # else the thread that collects results waits for the rest of one that was cut short
+        if manager is not None:
+            manager.join(PATIENCE)
+        for process in processes:
+            process.join(0.0)
+
+
+def _gone(processes: Sequence[BaseProcess], seconds: float) -> bool:
+    """Whether all processes end within a time."""
+    from multiprocessing.connection import wait as wait_for
+
+    left, last = {process.sentinel for process in processes}, time.monotonic() + seconds
+    while left and (now := time.monotonic()) < last:
+        left.difference_update(wait_for(list(left), last - now))
+    return not left
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Hold back an interrupt (Ctrl-C) for this process until the block ends, and for the processes started in it for good.
 
-    The terminal interrupts all processes of a command alike; workers that are about to start would each print a traceback.
+    The terminal interrupts all processes of a command alike; workers that are about to start would each print a traceback. What
+    another thread of this process receives, such as one of Arrow's, Python would raise in the main thread all the same: so the
+    handler itself only takes note.
     """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    noted: list[int] = []
+    main = threading.current_thread() is threading.main_thread()
+    handler = signal.getsignal(signal.SIGINT) if main else None  # None also of one that Python does not know
+    masked = hasattr(signal, "pthread_sigmask")  # not on Windows
     try:
-        yield
+        if handler is not None:
+            signal.signal(signal.SIGINT, lambda number, frame: noted.append(number))
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masked else set()
+        try:
+            yield
+        finally:
+            if masked:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if handler is not None:
+            signal.signal(signal.SIGINT, handler)
+        if noted:
+            signal.raise_signal(signal.SIGINT)
 
 
 @contextmanager
@@ -147,7 +210,7 @@ def one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[tuple[Block, Any]]:
+def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Done:
     """Blocks with their tables as they are done, by the workers of a Dask cluster, which have truenorth installed.
 
     A worker that dies is the scheduler's to replace; what it was at is done again.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import as_completed
+from contextlib import closing
 from functools import cached_property
 from itertools import product
 from typing import Any, Literal, NamedTuple
@@ -99,14 +100,19 @@ def run_faults(
     draws = list(product(procedures or tuple(BENCHES), range(runs)))
     left = {(name, run): [fault for fault in asked if (name, fault, seed, run) not in found] for name, run in draws}
     left = {draw: missing for draw, missing in left.items() if missing}
-    for trial in _in_turn(left, seed, tell) if workers == 1 else _by_workers(left, seed, min(workers, len(left)), tell):
-        save(trial)
-        found[trial.procedure, trial.fault, trial.seed, trial.run] = trial
+    trials = _in_turn(left, seed, tell) if workers == 1 else _by_workers(left, seed, min(workers, len(left)), tell)
+    with closing(trials):
+        for trial in trials:
+            save(trial)
+            found[trial.procedure, trial.fault, trial.seed, trial.run] = trial
     keys = ((name, fault, seed, run) for name, run in draws for fault in asked)
     return [found[key] for key in keys if key in found]
 
 
-def _in_turn(left: Mapping[Pair, Sequence[str]], seed: int, tell: Callable[[str], None]) -> Iterator[Trial]:
+Trials = Generator[Trial, None, None]
+
+
+def _in_turn(left: Mapping[Pair, Sequence[str]], seed: int, tell: Callable[[str], None]) -> Trials:
     for (name, run), faults in left.items():
         draw = _Draw(BENCHES[name], seed, run)
         for fault in faults:
@@ -116,9 +122,7 @@ def _in_turn(left: Mapping[Pair, Sequence[str]], seed: int, tell: Callable[[str]
                 yield trial
 
 
-def _by_workers(
-    left: Mapping[Pair, Sequence[str]], seed: int, workers: int, tell: Callable[[str], None]
-) -> Iterator[Trial]:
+def _by_workers(left: Mapping[Pair, Sequence[str]], seed: int, workers: int, tell: Callable[[str], None]) -> Trials:
     with one_thread_each(), pool_of(max(workers, 1), __name__) as pool:
         with uninterrupted():  # the first task starts the workers
             under_way = {pool.submit(_of_one, name, run, faults, seed): name for (name, run), faults in left.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -149,10 +150,11 @@ def run_campaign(
             results = in_this_process(plan, blocks)
         else:
             results = in_processes(plan, blocks, min(workers, max(1, len(blocks))))
-        for block, table in results:
-            store.write(block, table)
-            done += block.last - block.first + 1
-            tell(done, total)
+        with closing(results):
+            for block, table in results:
+                store.write(block, table)
+                done += block.last - block.first + 1
+                tell(done, total)
     return Campaign(plan, Path(folder))
 
 

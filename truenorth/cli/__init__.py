@@ -10,6 +10,7 @@ import functools
 import gc
 import io
 import os
+import re
 import sys
 from collections.abc import Iterable
 from contextlib import nullcontext
@@ -22,7 +23,7 @@ from truenorth.cli.files import FORCE, check_names, check_output, inputs, with_l
 from truenorth.cli.plain import PlainCommand, PlainGroup
 from truenorth.cli.wording import in_options
 from truenorth.core.atomic import protected
-from truenorth.core.errors import TruenorthError
+from truenorth.core.errors import DataError, TruenorthError
 from truenorth.core.language import LANGUAGES, retold, speak
 from truenorth.core.version import __version__
 
@@ -115,6 +116,23 @@ def _speak_early(arguments: list[str]) -> None:
         speak(asked)
 
 
+def _out_of_memory(commands: Iterable[str], error: MemoryError) -> TruenorthError:
+    """What was asked for and could not be had, in one message; NumPy and Arrow say how much."""
+    command, *others = commands
+    what = f"`{'truenorth' if others else command}`"
+    size = re.search(r"[\d.]+ [KMGT]iB", str(error)) or re.search(r"\bsize (\d+)", str(error))
+    if size is None:
+        return DataError(
+            f"{what} needs more memory than is free; expected a shorter log or scenario, a lower rate, or a computer with more "
+            "free memory"
+        )
+    amount = size.group().replace(". ", " ") if size.re.groups == 0 else f"{int(size.group(1)) / 2**30:.3g} GiB"
+    return DataError(
+        f"{what} asked for {amount} of memory, and less is free; expected a shorter log or scenario, a lower rate, or a computer "
+        "with more free memory"
+    )
+
+
 @functools.cache
 def _leave_quickly() -> None:
     """Once in a process: else Python looks through all that is left before it ends, a tenth of `align`."""
@@ -146,6 +164,10 @@ def main() -> None:
     except TruenorthError as error:
         print(f"truenorth: {in_options(retold(str(error)))}", file=sys.stderr)
         sys.exit(error.exit_code)
+    except MemoryError as error:
+        short = _out_of_memory(_asked(sys.argv[1:]), error)
+        print(f"truenorth: {retold(str(short))}", file=sys.stderr)
+        sys.exit(short.exit_code)
     except SystemExit as stop:
         if stop.code == INTERRUPTED:  # typer has turned the interrupt into this
             print("truenorth: interrupted; nothing half-written is left", file=sys.stderr)
