@@ -85,9 +85,26 @@ def best_clock(
         return None, []
     if abs(best.antenna.clock.rate + shown[0]) <= SHOWN_DELAY * shown[1]:  # its freedom explains something else
         return None, []
+    if max(best.ratio, 0.0) - _by_a_delay(run, antenna, track) <= limit(
+        "rival"
+    ):  # as late all the time explains as much
+        return None, []
     if best.ratio > limit("rival"):
         return best, []
     return None, _unsure(track, found, best)
+
+
+def _by_a_delay(run: Callable[[Mounting], Track], antenna: Mounting, track: Track) -> float:
+    """How well a clock fits that runs as the IMU's and is later or earlier all the time, by steps up to what a rate would make."""
+    many = math.ceil(WORST_CLOCK * float(track.time[-1] - track.time[0]) / STEP)
+    ratios = [-math.inf]
+    for d in STEP * np.arange(-many, many + 1):
+        other = replace(antenna, latency=antenna.latency + float(d))
+        try:
+            ratios.append(clock_ratio(track, run(other), antenna, other) if d else 0.0)
+        except DataError:  # the filter broke down: no explanation
+            continue
+    return max(ratios)
 
 
 def _unsure(track: Track, found: Sequence[Clocked], best: Clocked) -> list[Evidence]:

@@ -250,7 +250,8 @@ def counted_once(evidence: Sequence[Evidence]) -> list[Evidence]:
     if any(item.kind == "unknown" for item in evidence):
         return [item for item in evidence if not item.key.startswith("rival.")]
     if any(item.key == "heading.by_start" for item in evidence):
-        evidence = [replace(e, kind="hint") if e.key.startswith(("rival.", "delay.")) else e for e in evidence]
+        led = ("rival.", "delay.", "innovations.step")
+        evidence = [replace(e, kind="hint") if e.key.startswith(led) else e for e in evidence]
     added = NO_EFFECT
     for item in evidence:
         if item.key == "innovations.coloured":

@@ -27,8 +27,8 @@ QUOTED = re.compile(r'"\s*([+-]?\d+,\d+)\s*"', re.ASCII)  # a decimal comma betw
 EITHER = ".,"  # decimal points in some columns, commas in others
 SAMPLE = 40  # lines by which the dialect is judged
 FEWEST_CELLS = 3  # of a line that may be a row of another table
-# Begins as a number does, in digits of any script, and holds no word, which a name has (``6251.133827:scaledGyroX``); ``1.#QNAN``.
-BROKEN = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:#.*|(?!.*[A-Za-z]{3}).*)")
+# Begins as a number does, in digits of any script, and has no letter, which a name or a unit has; ``1.#QNAN``.
+BROKEN = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:#.*|[^a-zA-Z]*)")
 MOST_BELOW, MOST_ABOVE = 1, 10  # of such lines that may stand below a header, and above it: a cut row, a matrix
 
 
@@ -124,8 +124,8 @@ def notes_on_other_rows(
     DataError
         So many of them that they are rows: with the first one's line.
     """
-    _refuse_broken_rows(source, dialect, above, count)
     header = max(used, default=-1)
+    _refuse_broken_rows(source, dialect, above, header, count)
     notes: list[str] = []
     for below in (True, False):
         lines = [
@@ -148,16 +148,31 @@ def notes_on_other_rows(
     return tuple(notes)
 
 
-def _refuse_broken_rows(source: str, dialect: Dialect, above: Sequence[tuple[int, str]], count: int) -> None:
-    """Rows whose numbers are broken are no header, and none of those that stand above the first whole row is left out."""
-    for number, line in above:
-        cells = [] if is_remark(line) else dialect.cells(line)
-        broken = [cell for cell in cells if BROKEN.fullmatch(cell) and not dialect.is_number(cell)]
-        if broken and len(cells) == count and len(broken) + sum(map(dialect.is_number, cells)) > 0.5 * count:
-            raise DataError(
-                f"{source}: line {number}: {broken[0]!r} is no number, in a row of numbers; expected digits 0 to 9: put such rows "
-                "right, or remove them"
-            )
+def _refuse_broken_rows(
+    source: str, dialect: Dialect, above: Sequence[tuple[int, str]], header: int, count: int
+) -> None:
+    """Rows whose numbers are broken are no header, and none of those below it is left out; `header`: its place, -1 without one."""
+    found = [(number, cell) for number, line in above if (cell := _broken(dialect, line, count)) is not None]
+    if any(_broken(dialect, line, count) is not None for _, line in above[max(header, 0) :]):
+        number, cell = found[0]
+        raise DataError(
+            f"{source}: line {number}: {cell!r} is no number, in a row of numbers; expected digits 0 to 9: put such rows right, "
+            "or remove them"
+        )
+
+
+def _broken(dialect: Dialect, line: str, count: int) -> str | None:
+    """The first broken number of a row of the table; None of a line that is none."""
+    cells = [] if is_remark(line) else dialect.cells(line)
+    broken = [
+        cell for cell in cells if not dialect.is_number(cell) and BROKEN.fullmatch(cell) and not _has_letters(cell)
+    ]
+    whole = len(cells) == count and len(broken) + sum(map(dialect.is_number, cells)) > 0.5 * count
+    return broken[0] if broken and whole else None
+
+
+def _has_letters(cell: str) -> bool:
+    return "#" not in cell and any(map(str.isalpha, cell))
 
 
 def _are_numbers(dialect: Dialect, cells: Sequence[str]) -> bool:

@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 UP = PHI.start + 2
 LINEAR = 0.1  # rad: of a turn within it the errors are linear to half a per cent
 ROUNDING = 1e-9  # of a correlation
+NEAR = 0.1  # rad: further off, a start may lose the track that the answer keeps
 SEEN = 0.5  # of sigma: where answers differ by less, the log has shown heading
 
 
@@ -70,11 +71,12 @@ def start_evidence(run: Callable[[Start], Track], start: Start, track: Track) ->
         return [], none
     moved = np.zeros_like(sigma)
     for shift in shifts.T:
+        part = min(1.0, NEAR / max(float(np.linalg.norm(shift[PHI])), 1e-300))
         try:
-            other = run(_moved(start, shift))
+            other = run(_moved(start, part * shift))
         except DataError:  # the filter broke down: nothing to compare
             return [], none
-        moved += track.errors_against(other, nearest(other.time, track.time)) ** 2
+        moved += (track.errors_against(other, nearest(other.time, track.time)) / part) ** 2
     squares = moved / np.where(sigma > 0.0, sigma, np.inf) ** 2
     growth = np.sqrt(np.maximum(squares, 1.0))
     unseen = _unseen(np.sqrt(squares[:, UP]))
