@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from truenorth.core.compiled import Callback, compiled, compiled_callback
+from truenorth.core.compiled import Callback, borrowing, compiled, compiled_callback
 from truenorth.core.pointers import Pointer
 from truenorth.state.now import NOW_BEHIND
 
@@ -87,14 +87,14 @@ def with_state(values: Any, first: int, assumed: Any, at: int) -> Any:
     return a, b, c
 
 
-@compiled
+@borrowing
 def beyond_noise(rate: Any, variance: float) -> float:
     """Share of a rate that is not within its noise: squares of noise are no knowledge."""
     size = rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
     return max(0.0, 1.0 - _BY_CHANCE * variance / max(size, 1e-30))
 
 
-@compiled
+@borrowing
 def by_axes(assumed: Any, at: int, x: Any) -> Any:
     """``M x``, of what is assumed of a matrix of scale factors and misalignments, by rows; zeros where there is none; a tuple."""
     a, b, c = 0.0, 0.0, 0.0

@@ -162,7 +162,7 @@ def _refuse_broken_rows(
 
 
 def _broken(dialect: Dialect, line: str, count: int) -> str | None:
-    """The first broken number of a row of the table; None of a line that is none."""
+    """The first broken number of a row of the table; None where a line is no such row."""
     cells = [] if is_remark(line) else dialect.cells(line)
     broken = [
         cell for cell in cells if not dialect.is_number(cell) and BROKEN.fullmatch(cell) and not _has_letters(cell)

@@ -266,7 +266,8 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         raise DataError(f"{error}; expected the folder of a saved alignment") from None
     if missing := [name for name in ALIGNED if name not in s]:
         raise DataError(
-            f"{path}: this is no alignment of ours, it has no {missing[0]}; expected the folder of a saved alignment"
+            f"{path}: this is no alignment of ours, it has no {missing[0]}; expected the folder of a saved alignment: write the "
+            "alignment again"
         )
     if s.get("heading_deg") is None:
         raise AlignmentError(
