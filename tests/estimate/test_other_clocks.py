@@ -74,6 +74,18 @@ def test_aligned_on_a_clock_that_is_off_by_one_percent(run):
     assert "clock.runs_slow" in {item.key for item in answer.evidence}
 
 
+@pytest.mark.parametrize("grade", some(["consumer"], ["industrial"]))
+def test_a_receiver_that_is_late_all_the_time_is_on_no_other_clock(grade):
+    """By 1.5 s, whatever is usual: rates of half to one per cent come near it. The delay was up to 26 of its sigmas off."""
+    record, start, gnss, motion, spec = sailed(grade, 0.0, 2)
+    late = replace(gnss, time=gnss.time + 1.4)
+    result = navigate(record, start, aid=Gnss(late), imu=spec, deflection=STRAIGHT)
+    assert result.status == "navigated"
+    assert np.abs(off(result.track[-1:], motion, 0.0)).max() < 4.0
+    assert not any(item.key.startswith("clock.") for item in result.evidence)
+    assert abs(result.estimated()["GNSS lag"]["value"][0] - 1.5) < 0.2
+
+
 def test_a_delay_is_counted_from_that_of_the_same_moment():
     """A mounting whose delay is that of the end has another latency than that of the beginning, and is as late."""
     layout, still, sensors = Layout(("GNSS lag",), ((0.2, QUARTZ),)), np.zeros((2, 3)), np.zeros((2, 17))

@@ -6,7 +6,8 @@ does not lead there either, since a delay acts as its first derivative only as l
 radians of a swell of 6 s. So a log that does not show its rate is tried with some of them, at steps of the delay at its end.
 Twice the logarithm of a likelihood ratio says which fits. Each has a prior of its own, so a sound log exceeds c in less than
 ``exp(-c / 2)`` of cases (Markov's inequality); the next passes begin with the one that fits best, and find the rest. What a log
-neither shows nor rules out is in sigma by its chance.
+neither shows nor rules out is in sigma by its chance. A receiver that is later by the same all the time may explain it better, by
+what is known of its delay beforehand: then its clock is no other one, and the next passes begin with that delay.
 
 Measurements are taken by the IMU's seconds, ``y / (1 - r)`` of a velocity y. A density by y is that by the other one over
 ``1 - r``, and of 600 rows at 1 % this is 12 in twice the logarithm.
@@ -33,7 +34,8 @@ from truenorth.state.limits import limit
 from truenorth.state.mounting import Drift, Mounting
 from truenorth.state.track import Track
 
-STEP = 1.0  # s, of the delay at the end: within half of it a swell of 6 s turns by half a radian, of which the sine is within 4 %
+UNSAID = 1e-9  # s, one sigma of a delay that is given
+STEP = 0.5  # s, of the delay at the end: within half of it a swell of 6 s turns by a quarter of a radian
 
 
 class Clocked(NamedTuple):
@@ -85,26 +87,27 @@ def best_clock(
         return None, []
     if abs(best.antenna.clock.rate + shown[0]) <= SHOWN_DELAY * shown[1]:  # its freedom explains something else
         return None, []
-    if max(best.ratio, 0.0) - _by_a_delay(run, antenna, track) <= limit(
-        "rival"
-    ):  # as late all the time explains as much
-        return None, []
-    if best.ratio > limit("rival"):
+    late = _late_all_the_time(run, antenna, track)
+    of_late = late.ratio - ((late.antenna.latency - antenna.latency) / (antenna.latency_sigma or UNSAID)) ** 2
+    if best.ratio - limit("rival") > max(of_late, 0.0):
         return best, []
+    if of_late > limit("rival"):
+        return late, []
     return None, _unsure(track, found, best)
 
 
-def _by_a_delay(run: Callable[[Mounting], Track], antenna: Mounting, track: Track) -> float:
-    """How well a clock fits that runs as the IMU's and is later or earlier all the time, by steps up to what a rate would make."""
+def _late_all_the_time(run: Callable[[Mounting], Track], antenna: Mounting, track: Track) -> Clocked:
+    """The best of clocks that run as the IMU's and are later or earlier by some steps, up to what a rate would make."""
     many = math.ceil(WORST_CLOCK * float(track.time[-1] - track.time[0]) / STEP)
-    ratios = [-math.inf]
-    for d in STEP * np.arange(-many, many + 1):
-        other = replace(antenna, latency=antenna.latency + float(d))
+    found = [Clocked(antenna, track, 0.0)]
+    for step in (*range(-many, 0), *range(1, many + 1)):
+        other = replace(antenna, latency=antenna.latency + STEP * step)
         try:
-            ratios.append(clock_ratio(track, run(other), antenna, other) if d else 0.0)
+            late = run(other)
         except DataError:  # the filter broke down: no explanation
             continue
-    return max(ratios)
+        found.append(Clocked(other, late, clock_ratio(track, late, antenna, other)))
+    return max(found, key=lambda one: one.ratio)
 
 
 def _unsure(track: Track, found: Sequence[Clocked], best: Clocked) -> list[Evidence]:

@@ -27,8 +27,7 @@ QUOTED = re.compile(r'"\s*([+-]?\d+,\d+)\s*"', re.ASCII)  # a decimal comma betw
 EITHER = ".,"  # decimal points in some columns, commas in others
 SAMPLE = 40  # lines by which the dialect is judged
 FEWEST_CELLS = 3  # of a line that may be a row of another table
-# Begins as a number does, in digits of any script, and has no letter, which a name or a unit has; ``1.#QNAN``.
-BROKEN = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:#.*|[^a-zA-Z]*)")
+BROKEN = re.compile(r"[+-]?(?:\d+[.,]|[.,]\d)")  # as a number begins, in digits of any script
 MOST_BELOW, MOST_ABOVE = 1, 10  # of such lines that may stand below a header, and above it: a cut row, a matrix
 
 
@@ -164,14 +163,13 @@ def _refuse_broken_rows(
 def _broken(dialect: Dialect, line: str, count: int) -> str | None:
     """The first broken number of a row of the table; None where a line is no such row."""
     cells = [] if is_remark(line) else dialect.cells(line)
-    broken = [
-        cell for cell in cells if not dialect.is_number(cell) and BROKEN.fullmatch(cell) and not _has_letters(cell)
-    ]
+    broken = [cell for cell in cells if BROKEN.match(cell) and not (dialect.is_number(cell) or _has_letters(cell))]
     whole = len(cells) == count and len(broken) + sum(map(dialect.is_number, cells)) > 0.5 * count
     return broken[0] if broken and whole else None
 
 
 def _has_letters(cell: str) -> bool:
+    """As a name or a unit has; ``1.#QNAN`` is neither."""
     return "#" not in cell and any(map(str.isalpha, cell))
 
 
