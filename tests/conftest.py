@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import settings
 
 from tests.sizes import compiled_only
 from truenorth.cli import GARBAGE
+from truenorth.core.language import in_language
 
 # Modules and thousands of tests are no garbage: Python would look through them again and again while it collects the tests,
 # and as often in each test. A twentieth of the time.
@@ -63,6 +65,13 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     gc.freeze()
     gc.set_threshold(*GARBAGE)  # as the program does
     gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def english() -> Iterator[None]:
+    """A test that runs the program in another language leaves it at its end, as the program does."""
+    with in_language("en"):
+        yield
 
 
 @pytest.fixture
