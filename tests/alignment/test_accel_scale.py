@@ -34,7 +34,8 @@ def test_the_size_along_the_inner_axis_is_that_of_the_scale_factor(run, scale):
     assert item.figures["scale"] == pytest.approx(scale, rel=0.25)
 
 
-@pytest.mark.parametrize("axis", some([0], [1, 2]))
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_small_one_that_no_specification_names_refuses_nothing(axis):
     """100 ppm are usual; what they do is far below sigma."""
     inputs, _ = BENCHES["rotary"].draw(SEED, 0)
@@ -49,6 +50,7 @@ def test_a_scale_factor_that_the_specification_names_is_a_state_and_no_fault():
     assert found_in(answer) is None
 
 
+@pytest.mark.slow
 def test_one_along_the_inner_axis_is_refused():
     """Once silent: heading 3.9 sigmas off, level 3.4."""
     (trial,) = run_faults(["rotary"], ["accel scale"], runs=1, seed=771204)

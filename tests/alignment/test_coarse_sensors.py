@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.runs import some
 from truenorth.aiding.aids import Indexer
 from truenorth.alignment import align
 from truenorth.alignment.coarse_sensors import calibrated, known_sensors, matrix_evidence
@@ -107,12 +106,10 @@ def test_a_sway_shows_no_error_of_a_sensor_in_the_averaged_system():
         assert (off < 1e-3 * np.abs(turn[:, :, scale]).max()) == same
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imu", "run", "said"),
-    some(
-        [("consumer", 2, True)],
-        [(imu, run, said) for imu in ("consumer", "industrial") for run in range(12) for said in (True, False)],
-    ),
+    [(imu, run, said) for imu in ("consumer", "industrial") for run in range(12) for said in (True, False)],
 )
 def test_a_sound_log_of_poor_gyros_is_answered(imu, run, said):
     """Of six logs of a consumer IMU three were refused, and levels were 4.7 sigmas off, 18.7 without its biases."""
@@ -128,9 +125,8 @@ def test_a_sound_log_of_poor_gyros_is_answered(imu, run, said):
     assert np.abs(off).max() < 4.0, misses(answer, truth)
 
 
-@pytest.mark.parametrize(
-    "spoilt", some([None], [((0, -1.0),), ((2, 1.1),)])
-)  # 10 % of the slower axis passes for a bias
+@pytest.mark.slow
+@pytest.mark.parametrize("spoilt", [None, (0, -1.0), (2, 1.1)])  # 10 % of the slower axis passes for a bias
 def test_gyros_that_turn_as_gravity_does_without_their_biases(spoilt):
     """At rest on an indexer: by raw rates of .3 deg/s too much gravity swings, and 2 of 8 sound logs were refused for it."""
     bench = BENCHES["rotary"]

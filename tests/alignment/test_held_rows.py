@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import truenorth as tn
+from tests.runs import some
 from truenorth.core.attitude import euler_from_dcm
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
@@ -45,7 +46,7 @@ def whole(van):
     return tn.align(record, aid=tn.Gnss(gnss), imu="industrial")
 
 
-@pytest.mark.parametrize("how", HELD)
+@pytest.mark.parametrize("how", some(["every second"], ["every third", "110 Hz at 166 Hz"]))
 def test_a_van_whose_sensor_is_slower_than_its_log(van, whole, how):
     """`inconsistent` before, though within 2.3 sigma."""
     record, gnss, true = van
@@ -57,6 +58,7 @@ def test_a_van_whose_sensor_is_slower_than_its_log(van, whole, how):
     assert [item.key for item in found.evidence].count("record.repeated_rows") == 1
 
 
+@pytest.mark.slow
 def test_samples_that_are_held_for_ten_rows_are_said(van):
     record, gnss, _ = van
     held = written(record, np.arange(len(record)) // 10 * 10)

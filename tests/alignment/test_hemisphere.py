@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tests.alignment.test_bias_step import PLACE, ship
-from tests.runs import some
 from truenorth.alignment import align, rotary
 from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.campaign.fault_benches import BENCHES
@@ -15,7 +14,8 @@ from truenorth.core.position import Position
 from truenorth.state.limits import limit
 
 
-@pytest.mark.parametrize(("bench", "run"), some([("swaying", 1)], [("rotary", 0), ("swaying", 2), ("rotary", 4)]))
+@pytest.mark.slow
+@pytest.mark.parametrize(("bench", "run"), [("swaying", 1), ("rotary", 0), ("swaying", 2), ("rotary", 4)])
 def test_the_other_hemisphere_is_named_and_the_right_one_is_not(bench, run):
     """Of 10 draws of each the ratios were -20 to -180 at the right latitude, 22 to 160 at the wrong one."""
     inputs, _ = BENCHES[bench].draw(8301, run)

@@ -10,6 +10,7 @@ from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.state.limits import limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", ["odometer", pytest.param("gnss", marks=pytest.mark.slow)])
 def test_gyros_half_a_turn_about_the_vertical_are_found_and_named(bench):
     """Seed 1: before, heading was 101 sigmas off with an odometer, `aligned`."""

@@ -43,7 +43,13 @@ def test_align_and_go_on(files, tmp_path):
     printed = call("align", log, *common, "--to", 60)
     assert "heading of the vehicle" in printed.stdout
     assert "odometer: scale" in printed.stdout
-    unplaced = call("align", log, "--odometer", odometer, "--imu", "navigation", "--to", 150, "--json")
+
+
+@pytest.mark.slow
+def test_a_drive_of_unknown_latitude(files):
+    unplaced = call(
+        "align", files / "imu.csv", "--odometer", files / "odo.csv", "--imu", "navigation", "--to", 150, "--json"
+    )
     assert unplaced.exit_code == 0, unplaced.output
     assert "the latitude was not given: found from the log" in unplaced.stdout
 

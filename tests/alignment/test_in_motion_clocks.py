@@ -44,6 +44,7 @@ def test_gyros_of_another_moment_are_found_on_the_move(procedure, late):
         assert max(np.abs(x).max() for x in misses(answer, truth).values()) < 3.0
 
 
+@pytest.mark.slow
 def test_the_drive_with_late_gyros_that_passed_in_silence():
     """Seed 8203: .1 s late, 4.2 sigmas off, `aligned`."""
     bench = BENCHES["gnss"]
@@ -87,6 +88,7 @@ def test_a_tractor_that_pitches_on_its_springs_has_gyros_of_one_moment():
     assert case.run(1, 12).refused == ""
 
 
+@pytest.mark.slow
 def test_a_tractor_that_rough_ground_rocks_has_gyros_of_one_moment():
     """Its receiver is .01 s late within its .03: gyros .03 s later bring what the delay's column lacks, a ratio of 30, refused."""
     case = next(case for case in CASES if case.name == "by GNSS, tactical, tractor")

@@ -40,6 +40,7 @@ def seen_by(monkeypatch, log):
     return answer, tasks[-1]
 
 
+@pytest.mark.slow
 def test_axes_of_gyros_that_are_constants_count_once(monkeypatch, turning):
     """Misalignments of 2 arcsec as noise in turns besides their states made the sigma of heading two to three times as large."""
     answer, task = seen_by(monkeypatch, turning)

@@ -97,6 +97,7 @@ def late():
     return car("GNSS late by 1 s, car")
 
 
+@pytest.mark.slow
 def test_a_late_receiver_is_found_out_and_said(late):
     answer = align_in_motion(late.record, "industrial", gnss=late.aiding["gnss"])
     delay, sigma = answer.moving.delays["GNSS"]
@@ -116,6 +117,7 @@ def test_places_without_velocities_or_with_sigmas_too_small(late):
     assert said["GNSS position"] == pytest.approx(3.0, rel=0.25)
 
 
+@pytest.mark.slow
 def test_an_odometer_noisier_than_usual_is_no_contradiction():
     log = car("odometer noisier")
     answer = align_in_motion(log.record, "navigation", odometer=log.aiding["odometer"], position=log.start)

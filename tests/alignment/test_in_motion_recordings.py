@@ -144,6 +144,7 @@ def standing():
     return imu, gnss, align(imu, imu="navigation", aid=[Gnss(gnss)])
 
 
+@pytest.mark.slow
 def test_receiver_led_away_while_the_vehicle_stands(standing):
     """By .3 m/s north from the first third on, places with it, which turns heading by 20 deg; the IMU rests, and knows better."""
     imu, gnss, as_it_was = standing
@@ -195,6 +196,7 @@ def test_car_levels_alike_by_gnss_and_by_both(begin, end):
         assert abs(off) < 2.5 * np.hypot(both.euler_sigma[one], alone.euler_sigma[one]), name
 
 
+@pytest.mark.slow
 def test_car_without_gnss_claims_no_heading():
     from truenorth.core.position import Position
 

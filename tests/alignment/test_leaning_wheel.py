@@ -37,6 +37,7 @@ def drive():
     return sim, van.simulate_aiding(seed=12)["odometer"].record
 
 
+@pytest.mark.slow
 def test_what_tyres_and_springs_give_is_found(drive):
     """The two angles to three sigmas, attitude to four."""
     sim, odometer = drive

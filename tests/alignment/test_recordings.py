@@ -30,6 +30,7 @@ class TestRingLaserOnADisturbedVehicle:
             assert abs(_heading(answer) - 90.6) < 0.1
             assert answer.method != "analytic"
 
+    @pytest.mark.slow
     def test_scatter_of_120_s_windows_is_what_the_random_part_says(self):
         """Squares about the weighted mean, each over its own sigma: chi-square of 6 degrees of freedom, 1.24 to 14.45 in 95 %.
 

@@ -57,6 +57,7 @@ def test_a_sound_log_passes(waiting) -> None:
     assert _off(answer) < 3.0 * np.degrees(answer.euler_sigma[0])
 
 
+@pytest.mark.slow
 def test_gyros_whose_axes_are_exchanged_miss_the_earths_rate(waiting) -> None:
     record, gnss, spec = waiting
     short = record.between(None, 60.0)  # behind each rival stands a navigation, and a longer log has more of them

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import truenorth as tn
-from tests.runs import some
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.navigation.stops import turned_in_stops
 from truenorth.records.specs import imu_spec
@@ -68,7 +67,8 @@ def test_a_turn_on_the_spot_between_stops_is_no_change():
     assert shift_evidence(turned, imu_spec("consumer"), track, None, gnss) == []
 
 
-@pytest.mark.parametrize("seed", some([0], [1]))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
 def test_navigation_says_so_too(seed):
     """It took such a change for the bias it had begun with, and did not look."""
     log, gnss = van(seed)

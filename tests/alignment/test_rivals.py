@@ -50,6 +50,7 @@ def test_a_scale_factor_that_makes_up_for_another_heading_is_in_sigma(heading):
     assert np.abs(off).max() < 4.0
 
 
+@pytest.mark.slow
 def test_an_imu_whose_scale_factors_are_known_has_one_heading():
     answer, off = answered("navigation", NORTH, encoder=True, duration="300 s")
     assert not has_rival(answer)

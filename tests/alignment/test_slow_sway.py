@@ -57,9 +57,10 @@ def test_a_sway_that_is_not_slow_is_not_looked_at_again() -> None:
     assert not any(item.key == "sway.slow" for item in answer.evidence)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "run"),
-    some([("accel bias step", 6)], [("base leaves slowly", 4), ("specification ten times too good", 6)]),
+    [("accel bias step", 6), ("base leaves slowly", 4), ("specification ten times too good", 6)],
 )
 def test_what_a_slow_oscillator_took_up_is_not_silent(fault: str, run: int) -> None:
     """By 4.6, 3.6 and 12.2 sigmas as first run: the fit of the sway explained all three."""
@@ -80,7 +81,8 @@ def test_sound_sensors_are_not_called_noisy_on_a_slow_sway(seed: int) -> None:
     assert not any(item.key.startswith("specification.") for item in answer.evidence)
 
 
-@pytest.mark.parametrize("seed", some([7], [6, 8, 9]))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [7, 6, 8, 9])
 def test_nor_are_they_where_a_ship_at_her_moorings_goes_in_many_tones(seed: int) -> None:
     """Above the sway they look white, and are as quiet as specified: what is slow and louder is a motion."""
     inputs, _ = _moored(seed, period=80.0, amplitude=0.3, duration=240.0, tones_each=6)

@@ -9,13 +9,14 @@ from benchmarks.honesty import vehicles
 from benchmarks.honesty.foreign import sensed
 from tests import recordings
 from tests.alignment.test_in_motion_recordings import FOG
+from tests.runs import some
 from truenorth.alignment import align
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
 
 
 @pytest.mark.usefixtures("without_gyro_matrix")
-@pytest.mark.parametrize("imu", [None, FOG])
+@pytest.mark.parametrize("imu", some([FOG], [None]))
 def test_an_accelerometer_that_drifts_on_an_idling_car_is_no_noise(imu):
     """.5 mg within the last quarter: gyros 180 times as noisy as usual explained it, and level was that of the drift, 5 sigmas off.
 

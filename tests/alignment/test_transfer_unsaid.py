@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import truenorth
-from tests.runs import some
 from truenorth.aiding.aids import Master
 from truenorth.campaign.fault_benches import BENCHES, misses
 
@@ -16,7 +15,8 @@ def slave(run, imu):
     return drawn.draw(61, run)
 
 
-@pytest.mark.parametrize("imu", some(["consumer"], ["industrial"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("imu", ["consumer", "industrial"])
 def test_the_log_says_of_which_grade(imu):
     """Before, a consumer slave was `inconsistent`: 18 of 18."""
     inputs, truth = slave(0, imu)

@@ -122,6 +122,7 @@ def test_of_an_arm_nothing_is_said_or_it_is_measured(said):
     assert np.abs((answer.transfer.lever_arm - arm) / answer.transfer.lever_arm_sigma).max() < 4.0
 
 
+@pytest.mark.slow
 def test_a_tape_measures_an_arm_to_a_metre():
     """Seven metres off it is not the one that was measured; nothing being said of it, it may be."""
     way = ship()
@@ -160,7 +161,8 @@ def test_errors_of_the_master_by_name():
             master_errors(wrong)
 
 
-@pytest.mark.parametrize("run", some([0], [1, 2]))
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [0, 1, 2])
 def test_level_of_a_consumer_slave_by_velocity_alone(run):
     """Ships of seed 88170: 7.4, 6.0 and 5.9 sigmas off, `aligned`, while each pass began with the level that the master gave."""
     rng = np.random.default_rng([88170, run])
@@ -175,6 +177,7 @@ def test_level_of_a_consumer_slave_by_velocity_alone(run):
     assert np.all(np.abs(off) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
 
 
+@pytest.mark.slow
 def test_a_delay_that_cannot_be_seen_is_not_printed_as_seen():
     """Straight on in still air: the noise of the gyros, squared over two thousand rows, is no knowledge of a delay."""
     way = course(Position.from_degrees(62.0, 20.0, 3000.0), straight(200.0), heading=0.6, speed=150.0)

@@ -154,12 +154,12 @@ def test_velocities_turned_against_positions(degrees):
         assert abs(found[0].figures["angle"] - angle) < 3.0 * found[0].figures["sigma"] + 1e-3
 
 
-@few_and_all(3, few=1)
-def test_an_encoder_that_is_off_wobbles(runs):
+@pytest.mark.slow
+def test_an_encoder_that_is_off_wobbles():
     """Through a sway of degrees zero and discs are found to a hundredth of a degree and less; a sound encoder is left alone."""
     from dataclasses import replace
 
-    for run in range(runs):
+    for run in range(3):
         inputs, _ = BENCHES["rotary"].draw(SEED, run)
         angles = inputs["encoder"].angles
 

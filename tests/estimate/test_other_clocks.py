@@ -74,7 +74,8 @@ def test_aligned_on_a_clock_that_is_off_by_one_percent(run):
     assert "clock.runs_slow" in {item.key for item in answer.evidence}
 
 
-@pytest.mark.parametrize("grade", some(["consumer"], ["industrial"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("grade", ["consumer", "industrial"])
 def test_a_receiver_that_is_late_all_the_time_is_on_no_other_clock(grade):
     """By 1.5 s, whatever is usual: rates of half to one per cent come near it. The delay was up to 26 of its sigmas off."""
     record, start, gnss, motion, spec = sailed(grade, 0.0, 2)

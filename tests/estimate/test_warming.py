@@ -66,6 +66,7 @@ def test_three_sizes_of_accelerometers_that_warm_up_are_found_with_what_they_do(
     assert not warming_rivals(run, run(STILL), STILL, SPEC)
 
 
+@pytest.mark.slow
 def test_accelerometers_that_warm_up_on_a_drive_are_in_sigma():
     """Seed 12, run 9: of 209 ug heading was 5.8 sigmas off, without a word."""
     draw = _Draw(BENCHES["odometer"], 12, 9)

@@ -9,6 +9,7 @@ import pytest
 
 from tests.formats.corpus.truth import DEG
 from tests.formats.test_field_logs import MOVED, G, is_read, rows
+from tests.runs import some
 from truenorth.core.errors import DataError
 from truenorth.formats import read_gnss, read_imu
 from truenorth.formats.wraps import unwrapped
@@ -179,8 +180,8 @@ def labelled(mark, between, clock="t"):
     return lines
 
 
-@pytest.mark.parametrize("mark", [":", "=", ": ", " = "])
-@pytest.mark.parametrize("between", [" ", ",", ", ", "\t", " | "])
+@pytest.mark.parametrize("mark", some([":", " = "], ["=", ": "]))
+@pytest.mark.parametrize("between", some([" ", ", "], [",", "\t", " | "]))
 def test_labelled_values(tmp_path, mark, between):
     """As the plotter of the Arduino IDE wants them, behind what the device says when it starts."""
     boot = ["ets Jun  8 2016 00:22:57", "rst:0x1 (POWERON_RESET),boot:0x13", "MPU6050 found!", ""]

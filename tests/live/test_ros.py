@@ -39,7 +39,7 @@ def taken(source, enough, seconds=20.0):
     return np.vstack(found)
 
 
-@pytest.mark.parametrize("step", some([1, 10**6], [100]))
+@pytest.mark.parametrize("step", some([10**6], [1, 100]))
 def test_an_mcap_file_that_grows(step, tmp_path):
     whole = next(write_bag(tmp_path, "mcap").glob("*.mcap"))
     data, growing = whole.read_bytes(), tmp_path / "growing.mcap"

@@ -67,6 +67,7 @@ def test_both_delays_are_found_and_said(drive, smooth):
         assert said[name].figures["size"] == pytest.approx(abs(found["value"][0]))
 
 
+@pytest.mark.slow
 def test_a_delay_that_is_given_is_that_of_all(drive):
     """Nothing is asked of a clock that is known."""
     motion, record, start = drive

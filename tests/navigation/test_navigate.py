@@ -331,6 +331,7 @@ def test_a_track_over_the_date_line_is_two_lines():
     assert C_en(0.0, np.pi)[0, 2] == pytest.approx(-1.0)
 
 
+@pytest.mark.slow
 def test_a_log_of_which_nothing_is_said_may_be_in_a_current(drive):
     """A drift of .5 m/s east: in sigma where nobody says what log it is, and said; with none stated, it is in the velocity."""
     motion, record, start = drive

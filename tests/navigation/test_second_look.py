@@ -48,6 +48,7 @@ def test_an_antenna_of_a_metre_given_in_centimetres(drive):
     assert warnings(right) == []
 
 
+@pytest.mark.slow
 def test_a_wheel_given_in_centimetres_and_a_clock_are_separated(drive):
     """The car does not slide at its centre: a wheel half a metre to its left, given as 50 m."""
     motion, record, start = drive

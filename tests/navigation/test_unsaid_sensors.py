@@ -1,6 +1,7 @@
 """Sensors of which nothing is said: what a wheel counts and how it sits, and how late a receiver is, is estimated."""
 
 import numpy as np
+import pytest
 
 from tests.helpers import start_before
 from tests.navigation.test_navigate import SPEC, drive, fixes
@@ -15,6 +16,7 @@ from truenorth.state.mounting import Mounting
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
 
+@pytest.mark.slow
 def test_a_late_receiver(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 178.0), sigma=0.3)

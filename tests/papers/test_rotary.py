@@ -51,6 +51,7 @@ def test_what_the_filters_of_the_paper_do(run_a):
     np.testing.assert_allclose(ends, [ends[0]] * len(ends), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_source_of_the_rate_does_not_matter(run_a):
     """Heading of TRIAD within a hundredth of a degree; the q-method, .7 deg off at these rates, is nearer than TRIAD."""
     headings = [run_a.coarse["triad", source][2] for source in ("gyros", "nominal", "attitude")]

@@ -63,6 +63,7 @@ def test_shocks_and_noise_are_no_exchange():
     assert exchanged_packets(0.0 * data) is None
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_gyro_matrix")
 def test_the_indexer_that_passed_in_silence():
     """Seed 8203: a tenth of packets of 4 rows, 3.02 sigmas off, `aligned`."""

@@ -101,6 +101,7 @@ def test_waves_that_carry_a_ship_as_they_roll_her_are_no_delay_and_no_scale_fact
     assert found is None or found.evidence() == [], found
 
 
+@pytest.mark.slow
 def test_a_ship_that_the_waves_shake_sway_and_accelerate_by_turns_stays_where_she_is():
     """She was refused as one that moves: neither sway nor acceleration lasted from the first second to the last."""
     scenario = _moored(2)

@@ -44,6 +44,7 @@ def test_a_gyro_that_turns_too_far_is_found(scale):
     assert found["x"] == pytest.approx(scale, rel=0.2)
 
 
+@pytest.mark.slow
 def test_an_inferred_specification_is_not_held_against_its_log(monkeypatch):
     """It was taken for one that somebody gave: a sound tactical IMU was refused as in the other hemisphere (ratio 58)."""
     inputs, _ = BENCHES["rotary"].draw(61010, 1)
