@@ -252,7 +252,7 @@ def test_the_command(ship, tmp_path):
         "--indexer",
         str(tmp_path / "encoder.parquet"),
         "--lever-arm",
-        "-10,-30,-10",
+        "10,30,10",
         "--to",
         "60",
         "--indexer-sigma",

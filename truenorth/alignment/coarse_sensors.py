@@ -26,7 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import CoarseStart
+from truenorth.alignment.inference import WORST_ACCEL, WORST_GYRO
 from truenorth.alignment.swaying import Mount
+from truenorth.alignment.turning import with_usual
 from truenorth.alignment.usual import usual
 from truenorth.alignment.windowed import hann
 from truenorth.coarse import oba
@@ -71,14 +73,29 @@ def calibrated(start: CoarseStart, mount: Mount, turned: ImuSpec | None) -> Coar
     return start._replace(C_n0_i=oba(integrals, place.lat, place.alt, history=False).C_n0_i)
 
 
-def known_sensors(start: CoarseStart, C_sb: Array, turned: ImuSpec | None) -> KnownSensors:
-    """What an encoder shows of the gyros; parameters as in :func:`calibrated`, with `C_sb` (K+1, 3, 3) of its mount."""
+def shown_biases(start: CoarseStart, C_sb: Array) -> tuple[Array, Array]:
+    """What an encoder shows of the biases of gyros of which nothing but their noise is known, (3,) rad/s, and its sigmas.
+
+    That of a window leaves of a sway is their noise: a larger one would allow biases of which the log shows that there are none.
+    """
+    walks = start.model.gyro_random_walk, start.model.accel_random_walk
+    turned = with_usual(ImuSpec(gyro_random_walk=walks[0], accel_random_walk=walks[1]))
+    P_bias = np.diag([WORST_GYRO**2] * 3 + [WORST_ACCEL**2] * 3)
+    known = known_sensors(start._replace(P_bias=P_bias), C_sb, turned, waves=False)
+    return known.mean[GYRO_BIAS], np.sqrt(np.diag(known.P)[GYRO_BIAS])
+
+
+def known_sensors(start: CoarseStart, C_sb: Array, turned: ImuSpec | None, *, waves: bool = True) -> KnownSensors:
+    """What an encoder shows of the gyros; parameters as in :func:`calibrated`, with `C_sb` (K+1, 3, 3) of its mount.
+
+    `waves`: whether its covariance is that of a sway as large as is left; else of what the window leaves of one.
+    """
     prior = prior_of(start.P_bias, spec=turned)
     P = prior.P[prior.sensors, prior.sensors]
     known = KnownSensors(np.zeros(len(P)), P)
     for attempt in range(PASSES):
         integrals = integrate(start._replace(sensors=known).right_record(), start.interval)
-        known = _fitted(_turned(integrals, C_sb, small=attempt > 0), integrals, C_sb, known.mean, P)
+        known = _fitted(_turned(integrals, C_sb, small=attempt > 0), integrals, C_sb, known.mean, P, waves=waves)
     # They were so on the average of the log.
     known.P[GYRO_BIAS, GYRO_BIAS] += start.model.gyro_rate_walk**2 * start.record.duration * np.eye(3)
     return known
@@ -115,7 +132,9 @@ def _turned(integrals: InertialIntegrals, C_sb: Array, *, small: bool) -> Array:
     return rotation_vector_from_dcm((U @ Vt).T @ C_ib)
 
 
-def _fitted(theta: Array, integrals: InertialIntegrals, C_sb: Array, off: Array, P: Array) -> KnownSensors:
+def _fitted(
+    theta: Array, integrals: InertialIntegrals, C_sb: Array, off: Array, P: Array, *, waves: bool
+) -> KnownSensors:
     """All errors of the sensors.
 
     Parameters
@@ -126,6 +145,8 @@ def _fitted(theta: Array, integrals: InertialIntegrals, C_sb: Array, off: Array,
     C_sb : (K+1, 3, 3) array
     P : (n, n) array
         Covariance of all the errors about zero, as specified.
+    waves : bool
+        As in :func:`known_sensors`.
     """
     n, count = len(off), len(theta)
     H = np.concatenate([_response(integrals, C_sb, n), _line(integrals.time)], axis=2)
@@ -138,8 +159,9 @@ def _fitted(theta: Array, integrals: InertialIntegrals, C_sb: Array, off: Array,
     N = np.einsum("k,kmi,kmj->ij", weight, H, H) / LEFT**2
     y = np.einsum("k,kmi,km->i", weight, H, theta - H @ x0) / LEFT**2
     x = x0 + before @ np.linalg.solve(np.eye(len(x0)) + N @ before, y)
-    swayed = float(np.average(np.mean((theta - H @ x) ** 2, axis=1), weights=weight))
-    worse = max(swayed / LEFT**2, 1.0) * max(WAVE / float(integrals.intervals[0]), 1.0)
+    worse = max(WAVE / float(integrals.intervals[0]), 1.0)
+    if waves:
+        worse *= max(float(np.average(np.mean((theta - H @ x) ** 2, axis=1), weights=weight)) / LEFT**2, 1.0)
     after = before @ np.linalg.inv(np.eye(len(x0)) + N / worse @ before)
     return KnownSensors(off + x[:n], 0.5 * (after + after.T)[:n, :n])
 

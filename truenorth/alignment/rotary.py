@@ -23,7 +23,7 @@ from truenorth.alignment.accel_scale import accel_scale_evidence
 from truenorth.alignment.answer import answer_of
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
-from truenorth.alignment.coarse_sensors import calibrated, matrix_evidence
+from truenorth.alignment.coarse_sensors import calibrated, matrix_evidence, shown_biases
 from truenorth.alignment.encoder_angles import CarriedAngles, angles_at, carried_angles
 from truenorth.alignment.encoder_turns import base_turns
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
@@ -141,13 +141,12 @@ def align_rotary(
             f"{record.source}: {record.duration:.1f} s; a base that may sway needs {SHORTEST:g} s at least: record longer"
         )
     task = make_task(record, position, at)
-    spec = infer_turning(task) if given is None else given
     rows = np.array([task.epoch.row])
     coarse = integrate(record, task.interval, rows_at=rows)
     C_n0_i = oba(coarse, position.lat, position.alt, history=False).C_n0_i
     own = method if method in FADING else "swaying"
     tell(f"aligning: {own}")
-    model, P_bias = StaticModel.of(spec), np.diag(spec.bias_variance)
+    biases: Callable[[StaticModel], tuple[Array, Array]] | None = None
     if encoder is None:
         mount = Mount(np.zeros(3), offset_sigma)  # along the IMU's axes
     else:
@@ -155,6 +154,12 @@ def align_rotary(
         angles = angles_at(carried.record, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb, offset_sigma)
+
+        def biases(noise: StaticModel) -> tuple[Array, Array]:
+            return shown_biases(CoarseStart(record, C_n0_i, position, noise, np.zeros((6, 6)), task.interval), C_sb)
+
+    spec = infer_turning(task, biases) if given is None else given
+    model, P_bias = StaticModel.of(spec), np.diag(spec.bias_variance)
     start = calibrated(CoarseStart(record, C_n0_i, position, model, P_bias, task.interval, rows), mount, _turned(spec))
     if own in FADING:
         arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval)

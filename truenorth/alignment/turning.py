@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -114,10 +115,15 @@ def rocks_all_along(motion: MotionSummary) -> bool:
     return float(np.mean(rocks)) > MOSTLY
 
 
-def infer_turning(task: Task) -> ImuSpec:
-    """Specification of an IMU that turns: by its noise, by gravity, whose size shows at any attitude, and by its level rates."""
+def infer_turning(task: Task, biases: Callable[[StaticModel], tuple[Array, Array]] | None = None) -> ImuSpec:
+    """Specification of an IMU that turns: by its noise, by gravity, whose size shows at any attitude, and by its level rates.
+
+    Where it turns on an indexer, `biases` gives what the encoder shows of the gyros' in place of those rates, by the noise:
+    estimates and their sigmas (3,), rad/s.
+    """
     noise = turning_noise(task.record)
-    return with_usual(infer_spec(LogCheck(*_level_rates(task, noise), *force_size(task)), noise))
+    rates = _level_rates(task, noise) if biases is None else biases(noise)
+    return with_usual(infer_spec(LogCheck(*rates, *force_size(task)), noise))
 
 
 def _level_rates(task: Task, noise: StaticModel) -> tuple[Array, Array]:
