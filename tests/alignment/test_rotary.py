@@ -300,3 +300,13 @@ def test_a_method_of_a_base_is_refused_on_an_indexer(ship):
         UsageError, match="'states10' is that of a still base and a level IMU; choose one of auto, swaying, kf"
     ):
         align(ship.record, ship.place, ship.imu, aid=IndexerAid(ship.encoder), method="states10")
+
+
+@pytest.mark.parametrize(("case", "run"), some([("A", 2)], [("A", 4), ("B", 1), ("B", 5)]))
+def test_a_minute_on_an_indexer_with_nothing_said_of_the_imu(case, run):
+    """`inconsistent` before: biases as large as the indexer's rate were allowed, and the sway's fit took them for motion."""
+    ship = simulate_run(case, run, 3)
+    answer = align(ship.record.between(None, 60.0), ship.place, aid=IndexerAid(ship.encoder))
+    assert answer.status == "aligned", answer.reasons
+    off = error(answer, body_attitude(ship, answer.time)) / (np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN)
+    assert np.all(np.abs(off) < 4.0)

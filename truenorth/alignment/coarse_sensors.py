@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import CoarseStart
 from truenorth.alignment.inference import WORST_ACCEL, WORST_GYRO
 from truenorth.alignment.swaying import Mount
+from truenorth.alignment.task import Task
 from truenorth.alignment.turning import with_usual
 from truenorth.alignment.usual import usual
 from truenorth.alignment.windowed import hann
@@ -35,7 +36,7 @@ from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.indexing import indexer_turns
-from truenorth.errors.staying import BIASES
+from truenorth.errors.staying import BIASES, StaticModel
 from truenorth.estimate.staying import KnownSensors, prior_of
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import ANY_EFFECT, Evidence, Figure
@@ -73,15 +74,16 @@ def calibrated(start: CoarseStart, mount: Mount, turned: ImuSpec | None) -> Coar
     return start._replace(C_n0_i=oba(integrals, place.lat, place.alt, history=False).C_n0_i)
 
 
-def shown_biases(start: CoarseStart, C_sb: Array) -> tuple[Array, Array]:
-    """What an encoder shows of the biases of gyros of which nothing but their noise is known, (3,) rad/s, and its sigmas.
+def shown_biases(task: Task, C_n0_i: Array, C_sb: Array, noise: StaticModel) -> tuple[Array, Array]:
+    """What an encoder shows of the biases of gyros of which nothing but their noise is known, (3,) rad/s, and their sigmas.
 
-    That of a window leaves of a sway is their noise: a larger one would allow biases of which the log shows that there are none.
+    The noise of these estimates is what the window leaves of a sway: as large as the sway itself, it would allow biases where the
+    log shows that there are none.
     """
-    walks = start.model.gyro_random_walk, start.model.accel_random_walk
-    turned = with_usual(ImuSpec(gyro_random_walk=walks[0], accel_random_walk=walks[1]))
+    turned = with_usual(ImuSpec(gyro_random_walk=noise.gyro_random_walk, accel_random_walk=noise.accel_random_walk))
     P_bias = np.diag([WORST_GYRO**2] * 3 + [WORST_ACCEL**2] * 3)
-    known = known_sensors(start._replace(P_bias=P_bias), C_sb, turned, waves=False)
+    start = CoarseStart(task.record, C_n0_i, task.position, noise, P_bias, task.interval)
+    known = known_sensors(start, C_sb, turned, waves=False)
     return known.mean[GYRO_BIAS], np.sqrt(np.diag(known.P)[GYRO_BIAS])
 
 

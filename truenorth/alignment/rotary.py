@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from typing import Any
 
@@ -128,12 +129,7 @@ def align_rotary(
         Too short a record.
     """
     tell = progress or (lambda stage: None)
-    if method not in INDEXER_METHODS:
-        refuse(method, INDEXER_METHODS)
-    if not 0.0 <= angle_sigma < math.inf:
-        raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
-    if not 0.0 <= offset_sigma < math.inf:
-        raise UsageError(f"offset_sigma is {offset_sigma}; expected no negative length, m")
+    _must_make_sense(method, angle_sigma, offset_sigma)
     given = None if imu is None else noise_in(record, imu_spec(imu))
     record = bridged(corrected(record, given))
     if record.duration < SHORTEST:
@@ -146,7 +142,7 @@ def align_rotary(
     C_n0_i = oba(coarse, position.lat, position.alt, history=False).C_n0_i
     own = method if method in FADING else "swaying"
     tell(f"aligning: {own}")
-    biases: Callable[[StaticModel], tuple[Array, Array]] | None = None
+    biases = None
     if encoder is None:
         mount = Mount(np.zeros(3), offset_sigma)  # along the IMU's axes
     else:
@@ -154,10 +150,7 @@ def align_rotary(
         angles = angles_at(carried.record, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb, offset_sigma)
-
-        def biases(noise: StaticModel) -> tuple[Array, Array]:
-            return shown_biases(CoarseStart(record, C_n0_i, position, noise, np.zeros((6, 6)), task.interval), C_sb)
-
+        biases = partial(shown_biases, task, C_n0_i, C_sb)
     spec = infer_turning(task, biases) if given is None else given
     model, P_bias = StaticModel.of(spec), np.diag(spec.bias_variance)
     start = calibrated(CoarseStart(record, C_n0_i, position, model, P_bias, task.interval, rows), mount, _turned(spec))
@@ -197,6 +190,15 @@ def align_rotary(
         evidence += late_gyro_evidence(fine, record, anew)
         evidence += gyro_matrix_evidence(fine, record, spec, anew, evidence)
     return judged(answer, evidence, heading_limit)
+
+
+def _must_make_sense(method: str, angle_sigma: float, offset_sigma: float) -> None:
+    if method not in INDEXER_METHODS:
+        refuse(method, INDEXER_METHODS)
+    if not 0.0 <= angle_sigma < math.inf:
+        raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
+    if not 0.0 <= offset_sigma < math.inf:
+        raise UsageError(f"offset_sigma is {offset_sigma}; expected no negative length, m")
 
 
 def _from_headings(start: CoarseStart, mount: Mount, spec: ImuSpec, lat: float) -> tuple[FineAlignment, float]:
