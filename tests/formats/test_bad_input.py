@@ -1,5 +1,6 @@
 """Every mistake in a log is one message: the file, the line, the column, what was found, what to do."""
 
+import bz2
 import contextlib
 import gzip
 import re
@@ -337,4 +338,22 @@ def test_a_packed_line_without_an_end_is_refused_before_it_is_unpacked(tmp_path,
         file.write(b"time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + bytes([48]) * (1 << 22))
     monkeypatch.setattr(text, "text_of", lambda path: pytest.fail("unpacked"))
     with pytest.raises(DataError, match=r"log\.csv\.gz: line 2: longer than 64 KiB"):
+        read_imu(path)
+
+
+@pytest.mark.parametrize("name", ["log.parquet", "log.csv.bz2"])
+def test_short_memory_is_not_called_a_damaged_file(tmp_path, monkeypatch, name):
+    import pyarrow as pa
+
+    def short(*_, **__):
+        raise pa.lib.ArrowMemoryError("malloc of size 4096 failed")
+
+    path = tmp_path / name
+    write_imu(ImuRecord(np.arange(1.0, 5.0), np.zeros((4, 3)), np.ones((4, 3))), tmp_path / "log.parquet")
+    if name.endswith("bz2"):
+        path.write_bytes(bz2.compress("\n".join([HEADER, *ROWS]).encode()))
+        monkeypatch.setattr(pa, "CompressedInputStream", short)
+    else:
+        monkeypatch.setattr("pyarrow.parquet.ParquetFile", short)
+    with pytest.raises(MemoryError):
         read_imu(path)

@@ -224,6 +224,8 @@ def read_table(folder: str | os.PathLike[str], runs: int | None = None) -> pd.Da
         try:
             with arrow_file(path) as file:
                 tables.append(pq.read_table(file).cast(SCHEMA))
+        except MemoryError:  # Arrow's own is an ArrowException, too
+            raise
         except (pa.ArrowException, OSError) as error:
             raise DataError(f"{path}: the shard is damaged ({error}); remove it and run the campaign again") from None
     if not tables:

@@ -71,9 +71,7 @@ def warm(
     ] = False,
 ) -> None:
     """Compile what the other commands need and keep it for all that follow; a second call finds it done."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
+    from truenorth.campaign.execution import pool_of
     from truenorth.core.kernel_folder import write_folder
 
     folder = write_folder()
@@ -90,7 +88,7 @@ def warm(
         return
     begun = time.monotonic()
     count = min(workers or os.cpu_count() or 1, len(tasks))
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+    with pool_of(count) as pool:
         _show(pool, tasks)
     for stamp in wanted:
         stamp.touch()

@@ -93,6 +93,8 @@ def _bytes(path: Path, most: int) -> bytes:
             while left > 0 and (part := stream.read(min(left, 1 << 24))):
                 parts.append(part)
                 left -= len(part)
+    except MemoryError:  # Arrow's own is an ArrowException, too
+        raise
     except (OSError, pa.ArrowException) as error:
         raise DataError(f"{path.name}: the {how} archive is damaged or cut short ({error}); write it anew") from None
     return b"".join(parts)

@@ -45,6 +45,8 @@ def columns(path: Path, format: str) -> Columns:
                 else:
                     with pq.ParquetFile(raw) as file:
                         yield file
+        except MemoryError:  # Arrow's own is an ArrowException, too
+            raise
         except (pa.ArrowException, OSError) as error:
             what = format.capitalize()
             raise DataError(f"{path.name}: the {what} file is damaged or cut short ({error}); write it anew") from None

@@ -230,10 +230,7 @@ def processes(workers: int) -> Iterator[ProcessPoolExecutor | None]:
     if workers == 1:
         yield None
         return
-    import multiprocessing
+    from truenorth.campaign.execution import one_thread_each, pool_of
 
-    from truenorth.campaign.execution import one_thread_each
-
-    context: Any = multiprocessing.get_context("spawn")
-    with one_thread_each(), ProcessPoolExecutor(workers, mp_context=context) as pool:
+    with one_thread_each(), pool_of(workers) as pool:
         yield pool
