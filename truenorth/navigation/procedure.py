@@ -46,7 +46,7 @@ from truenorth.navigation.given import (
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
-from truenorth.navigation.start import force_at_rest, of_poorer, start_of
+from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
@@ -226,6 +226,7 @@ def _by_specification(
         evidence += seen
     else:
         evidence += burst_evidence(record)
+    force, acting = acting_at_rest(plan.start, noise)
     result = Navigation(
         status="navigated",
         evidence=(),
@@ -237,6 +238,8 @@ def _by_specification(
         imu_source=imu_source,
         source=record.source,
         late=late,
+        force=force,
+        acting=acting,
     )
     if damping is None:
         return judged_navigation(result, counted_once(evidence), least)
