@@ -23,6 +23,7 @@ LEAST_GAIN = 0.03  # m/s: what people getting in, and a vehicle that settles on 
 LEAST_TURN = np.radians(0.3)
 WANDERS = 10.0  # times what the first half wanders by
 GONE = 0.5  # of the gain that is plain: where it begins to rise
+UNSEEN_GAIN = GONE * LEAST_GAIN  # m/s: of which nothing is seen
 BACK = 2.4  # times from there to where it is plain: of a push that grows, half the speed is gained in 0.7 to 0.8 of the time
 SHORTEST = 10  # s: two halves of five
 

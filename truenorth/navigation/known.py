@@ -24,14 +24,14 @@ from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
-from truenorth.navigation.departure import leaves_at
+from truenorth.navigation.departure import UNSEEN_GAIN, leaves_at
 from truenorth.navigation.start import moving_start, start_from_alignment
 from truenorth.quality.held import as_sampled
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import note
-from truenorth.state.layout import PHI
+from truenorth.state.layout import DV, PHI
 from truenorth.state.prior import positive, prior_covariance
 from truenorth.state.state import Start
 
@@ -200,7 +200,9 @@ def known_start(
     if (pitch is None) != (roll is None):
         raise UsageError("pitch or roll is given alone; expected both, or none: the level then comes from the log")
     if pitch is None or roll is None:
-        return start_from_alignment(with_heading(_levelled(log, at, spec), heading, sigma))
+        answer, departs = _levelled(log, at, spec)
+        start = start_from_alignment(with_heading(answer, heading, sigma))
+        return _may_have_left(start) if departs else start
     if not (sigma > 0.0 and level_sigma > 0.0 and velocity_sigma > 0.0):
         raise UsageError(f"sigmas {sigma:g}, {level_sigma:g} rad, {velocity_sigma:g} m/s; expected all above zero")
     C_nb = dcm_from_euler(heading, pitch, roll)
@@ -284,8 +286,18 @@ def start_from_master(
     return replace(start, time=float(master.time[row]))
 
 
-def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> Alignment:
-    """The level by the beginning of the log, in which the vehicle goes nowhere; one that sways in the sea may seem to move."""
+def _may_have_left(start: Start) -> Start:
+    """The start of a vehicle that departs soon: it may have gained what is not plain yet."""
+    P = start.P.copy()
+    P[DV, DV] += np.diag([UNSEEN_GAIN, UNSEEN_GAIN, 0.0]) ** 2
+    return replace(start, P=P)
+
+
+def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> tuple[Alignment, bool]:
+    """The level by the beginning of the log, in which the vehicle goes nowhere, and whether it departs after that.
+
+    One that sways in the sea may seem to move.
+    """
     begin, regimes = float(record.time[0]), motion_summary(record).regimes
     longest = min(begin + LONGEST_LEVEL, float(record.time[-1]))
     start = record.between(None, longest)
@@ -294,12 +306,12 @@ def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> Alignment:
     leaves = leaves_at(start)
     if end - begin >= SHORTEST_LEVEL:
         end = end if leaves is None else min(end, max(leaves, begin + SHORTEST_LEVEL))
-        return align(record.between(None, end), place, spec)
+        return align(record.between(None, end), place, spec), end < longest
     turns = any(r.kind == "rotating" and r.start < longest for r in regimes)
     if leaves is None and not turns and longest - begin >= SHORTEST_SWAY:
         answer = align(start, place, spec)
         if answer.status in ("aligned", "level_only"):
-            return answer
+            return answer, False
     first = max(1.0, end + SEEN_LATE - begin)
     raise AlignmentError(
         f"{record.source}: the vehicle moves within the first {first:.0f} s; {SHORTEST_LEVEL + SEEN_LATE:g} s at rest are needed, "
