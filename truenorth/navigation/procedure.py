@@ -54,7 +54,7 @@ from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.held import as_sampled
-from truenorth.quality.innovations import innovation_evidence
+from truenorth.quality.innovations import contradicted, innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
@@ -363,8 +363,10 @@ def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evide
         track = run(part)
         later = delayed(replace(plan, record=part), open_, track)
         if later is not open_:
-            aiding = on_springs(plan.sources(later))
+            usual, whole, aiding = aiding, track, on_springs(plan.sources(later))
             track = run(part)
+            if contradicted(track.residuals) and not contradicted(whole.residuals):  # that was no delay
+                aiding, track = usual, whole
     except DataError:  # the filter broke down: no explanation
         return []
     return gyro_delay_evidence(run, track, part)
