@@ -16,10 +16,10 @@ from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.axes import standing
+from truenorth.errors.axes import proper_bias, standing
 from truenorth.estimate.latency import delays_found, rates_found
 from truenorth.records import OdometerRecord
-from truenorth.state.layout import ACCEL_AXES, ANTENNA_ARM, BA, BG, DP, GYRO_AXES, PHI
+from truenorth.state.layout import ACCEL_AXES, ANTENNA_ARM, BG, DP, GYRO_AXES, PHI
 from truenorth.state.track import Track
 
 
@@ -56,7 +56,8 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
         position = replace(position, horizontal_sigma=float(np.sqrt(np.diag(moving.P)[DP][:2].max())))
     elif spread.heading > 0.0:
         moving = moving.off_together(apart)
-    moving = replace(moving, delays=delays, clocks=rates_found(track, task.antenna))
+    clocks = rates_found(track, task.antenna)
+    moving = replace(moving, delays=delays, clocks=clocks, acting_bias=track.accel_bias[-1])
     return Alignment(
         status="not_converged",
         evidence=(),
@@ -69,7 +70,7 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
         gyro_bias=track.gyro_bias[-1],
         gyro_bias_sigma=history.gyro_bias_sigma[-1],
         gyro_bias_prior=prior[:3],
-        accel_bias=track.accel_bias[-1],
+        accel_bias=history.accel_bias[-1],
         accel_bias_sigma=history.accel_bias_sigma[-1],
         accel_bias_prior=prior[3:],
         position=position,
@@ -88,6 +89,7 @@ def _history(track: Track, task: MovingTask) -> History:
     sigma = np.sqrt(np.maximum(np.einsum("kii->ki", P), 0.0))
     g = float(normal_gravity(task.position.lat, task.position.alt))
     deflection = deflection_covariance(task.position.lat, g)
+    accel_bias, accel_sigma = proper_bias(track, standing(), task.spec.acting_variance(standing()))
     count = len(track.time)
     aided = max((r for r in track.residuals if len(r.time)), key=lambda r: len(r.time), default=None)
     innovation, expected, nis = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
@@ -104,8 +106,8 @@ def _history(track: Track, task: MovingTask) -> History:
         departure=departures(task.record, track),
         gyro_bias=track.gyro_bias,
         gyro_bias_sigma=sigma[:, BG],
-        accel_bias=track.accel_bias,
-        accel_bias_sigma=sigma[:, BA],
+        accel_bias=accel_bias,
+        accel_bias_sigma=accel_sigma,
         innovation=innovation,
         innovation_sigma=expected,
         nis=nis,

@@ -76,6 +76,9 @@ class Moving:
         known together.
     force : (3,) array, m/s^2
         Specific force at rest, body axes: the accelerometers' axes of `known` act on what differs from it.
+    acting_bias : (3,) array or None, m/s^2
+        What acts as the accelerometers' bias at that force, scale factors and misalignments included: `P` is of it, and navigation
+        goes on with it. None: in a result of an earlier version, whose `accel_bias` it is.
     """
 
     v_n: Array
@@ -91,6 +94,7 @@ class Moving:
     clocks: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=standing)
+    acting_bias: Array | None = None
 
     def less_sure(self, heading: float, level: float = 0.0, velocity: float = 1.0, position: float = 1.0) -> Moving:
         """The same state with these variances (rad^2) added to heading and level, and sigmas so many times as large."""

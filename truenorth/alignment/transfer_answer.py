@@ -27,7 +27,7 @@ from truenorth.core.attitude import (
     rotation_vector_from_dcm,
 )
 from truenorth.core.position import Position
-from truenorth.errors.axes import standing
+from truenorth.errors.axes import proper_bias, standing
 from truenorth.errors.master import ARM, ATTITUDE_ERROR, DELAY, MOUNTING, VELOCITY_ERROR, MasterErrors, TransferModel
 from truenorth.estimate.memory import REJECTED, REOPENED, USED
 from truenorth.records import ImuRecord, MasterRecord
@@ -108,6 +108,8 @@ def assemble_transfer(
     lat, lon, alt = (float(x) for x in track.position[-1])
     transfer = _transfer(last, said, notes)
     sigma = track.sigma[-1]
+    force = standing(assumed.C_mb)
+    accel_bias, accel_sigma = proper_bias(track[-1:], force, spec.acting_variance(force))
     answer = Alignment(
         status="not_converged",
         evidence=(),
@@ -120,15 +122,15 @@ def assemble_transfer(
         gyro_bias=track.sensors[-1, BG],
         gyro_bias_sigma=sigma[BG],
         gyro_bias_prior=gyro_prior,
-        accel_bias=track.sensors[-1, BA],
-        accel_bias_sigma=sigma[BA],
+        accel_bias=accel_bias[0],
+        accel_bias_sigma=accel_sigma[0],
         accel_bias_prior=accel_prior,
         position=Position(lat, lon, alt),
         imu=spec,
         imu_source=where,
         duration=slave.duration,
         disturbance=np.full(3, np.nan),
-        history=_history(slave, track, said, what),
+        history=_history(slave, track, said, what, spec.acting_variance(force), force),
         source=slave.source,
         transfer=transfer,
     )
@@ -175,6 +177,7 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
         course=_course(model, assumed, track),
         known=known,
         force=standing(assumed.C_mb),
+        acting_bias=track.sensors[-1, BA],
     )
 
 
@@ -324,12 +327,13 @@ def _states(slave: ImuRecord, track: Track, k: NDArray[np.intp]) -> tuple[Motion
     return states(middle, v, k[1:], w, f), states(track.C_nb[k[1:]], track.v_n[k[1:]], k[1:], w, f), T
 
 
-def _history(slave: ImuRecord, track: Track, said: MasterRows, what: Matched) -> History:
+def _history(slave: ImuRecord, track: Track, said: MasterRows, what: Matched, acting: Array, force: Array) -> History:
     columns = slice(3, 6) if what.translation is None else slice(0, 3)
     present = np.flatnonzero(np.isfinite(said.innovation[:, columns]).all(axis=1))
     k = present[:: max(1, -(-len(present) // MOST_ROWS))]
     covariance, floor = misalignment_covariance(track.P[k])
     final = final_attitudes(slave, track)[k]
+    accel_bias, accel_sigma = proper_bias(track[k], force, acting)
     return History(
         time=track.time[k],
         C_nb=track.C_nb[k],
@@ -338,8 +342,8 @@ def _history(slave: ImuRecord, track: Track, said: MasterRows, what: Matched) ->
         departure=-rotation_vector_from_dcm(track.C_nb[k] @ np.swapaxes(final, 1, 2)),
         gyro_bias=track.sensors[k, BG],
         gyro_bias_sigma=track.sigma[k, BG],
-        accel_bias=track.sensors[k, BA],
-        accel_bias_sigma=track.sigma[k, BA],
+        accel_bias=accel_bias,
+        accel_bias_sigma=accel_sigma,
         innovation=said.innovation[k, columns],
         innovation_sigma=said.sigma[k, columns],
         nis=said.nis[k, 1 if what.translation is None else 0],

@@ -71,6 +71,8 @@ class Transfer:
         The slave's scale factors and misalignments (:mod:`truenorth.errors.axes`), where they were estimated.
     force : (3,) array, m/s^2
         Specific force at rest, slave axes: the accelerometers' axes of `known` act on what differs from it.
+    acting_bias : (3,) array or None, m/s^2
+        As that of an alignment on the move (:class:`truenorth.alignment.moving.Moving`).
     """
 
     matching: str
@@ -100,6 +102,7 @@ class Transfer:
     course: Relation | None = None
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=standing)
+    acting_bias: Array | None = None
 
     @property
     def delay_estimated(self) -> bool:

@@ -19,7 +19,7 @@ from truenorth.core.errors import AlignmentError
 from truenorth.quality.regimes import SEEN_LATE
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
-from truenorth.state.layout import DP, DV
+from truenorth.state.layout import BA, DP, DV
 from truenorth.state.limits import is_estimated, limit
 
 Array = NDArray[np.float64]
@@ -214,11 +214,12 @@ def bias_evidence(answer: Alignment) -> list[Evidence]:
     found = []
     place = answer.position
     g = gravity_of_place(place.lat, place.alt)
+    accel, accel_sigma = _acting_bias(answer)
     stays = answer.moving is None and answer.transfer is None
     gravity = np.zeros(3) if stays else answer.imu.acting_variance(answer.C_nb[2] * g)
     for kind, bias, sigma, prior in (
         ("gyro", answer.gyro_bias, answer.gyro_bias_sigma, answer.gyro_bias_prior),
-        ("accel", answer.accel_bias, answer.accel_bias_sigma, np.sqrt(answer.accel_bias_prior**2 + gravity)),
+        ("accel", accel, accel_sigma, np.sqrt(answer.accel_bias_prior**2 + gravity)),
     ):
         for axis in range(3):
             size, allowed = abs(float(bias[axis])), float(prior[axis])
@@ -239,6 +240,14 @@ def bias_evidence(answer: Alignment) -> list[Evidence]:
     return found + _biases_together(answer, gravity) if answer.moving is not None else found
 
 
+def _acting_bias(answer: Alignment) -> tuple[Array, Array]:
+    """What acts as the accelerometers' bias, and its one-sigma; on the move what gravity makes of their axes is in it."""
+    moving = answer.moving or answer.transfer
+    if moving is None or moving.acting_bias is None:
+        return answer.accel_bias, answer.accel_bias_sigma
+    return moving.acting_bias, np.sqrt(np.maximum(np.diag(moving.P)[BA], 0.0))
+
+
 def _biases_together(answer: Alignment, gravity: Array) -> list[Evidence]:
     """Biases found on the move that are together larger than the specification allows, though none of them alone is.
 
@@ -247,12 +256,13 @@ def _biases_together(answer: Alignment, gravity: Array) -> list[Evidence]:
     biases and noise is as poor.
     """
     prior = np.concatenate([answer.gyro_bias_prior**2, answer.accel_bias_prior**2 + gravity])
-    own = np.concatenate([answer.gyro_bias_sigma, answer.accel_bias_sigma]) ** 2
+    accel, accel_sigma = _acting_bias(answer)
+    own = np.concatenate([answer.gyro_bias_sigma, accel_sigma]) ** 2
     seen = is_estimated(np.sqrt(own), np.sqrt(prior))
     count = int(seen.sum())
     if not count:
         return []
-    bias = np.concatenate([answer.gyro_bias, answer.accel_bias])
+    bias = np.concatenate([answer.gyro_bias, accel])
     total = float(np.sum((bias**2 / (prior + own))[seen]))
     if tail(total, count) > math.erfc(limit("doubt") / math.sqrt(2.0)):
         return []

@@ -25,8 +25,9 @@ from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.errors.group import Group, columns
 from truenorth.errors.ins import TURN_TIME
 from truenorth.records.specs import ImuSpec
-from truenorth.state.layout import ACCEL_AXES, BA, GYRO_AXES
+from truenorth.state.layout import ACCEL_AXES, BA, GYRO_AXES, SLOW_ACCEL
 from truenorth.state.now import NOW_C, NOW_FORCE_B, NOW_MEAN_RATE, NOW_SINCE, matrix_of, vector_of
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -118,6 +119,36 @@ def gyro_axes(spec: ImuSpec) -> Group:
 def accel_axes(spec: ImuSpec, force: ArrayLike) -> Group:
     """The elements of ``M_a`` by rows, which act on what differs from a force at rest, (3,) m/s^2."""
     return Group(ACCEL_AXES, axis_sigma(spec)[1], acts=_accels, figures=tuple(map(float, np.asarray(force))))
+
+
+def proper_bias(track: Track, force: ArrayLike, acting: ArrayLike) -> tuple[Array, Array]:
+    """The accelerometers' bias proper along a track, without ``M_a f0`` which its bias states hold, and its one-sigma.
+
+    Parameters
+    ----------
+    track : Track
+        With its covariance.
+    force : (3,) array, m/s^2
+        ``f0``.
+    acting : (3,) array, (m/s^2)^2
+        Variance of ``M_a f0`` by the specification, where the matrix is not among the states.
+
+    Returns
+    -------
+    bias, sigma : (K, 3) arrays, m/s^2
+    """
+    layout = track.layout
+    J = np.zeros((3, layout.states))
+    J[:, BA] = np.eye(3)
+    if (slow := layout.slice_of(SLOW_ACCEL)) is not None:
+        J[:, slow] = np.eye(3)
+    unseen = np.asarray(acting, dtype=np.float64)
+    if (own := layout.slice_of(ACCEL_AXES)) is not None:
+        unseen = np.zeros(3)
+        for i in range(3):
+            J[i, own.start + 3 * i : own.start + 3 * i + 3] = -np.asarray(force)
+    variance = np.einsum("ij,kjl,il->ki", J, track.P, J)
+    return track.sensors @ J.T, np.sqrt(np.maximum(variance, 0.0) + unseen)
 
 
 def known_as_bias(P: Array, values: Array, group: Group, first: int, constant: ArrayLike | None) -> tuple[Array, Array]:

@@ -37,10 +37,10 @@ from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.given import arm_as_begun, kept_altitude, mountings_found, turns_velocity
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
-from truenorth.navigation.start import force_at_rest, start_of
+from truenorth.navigation.start import acting_at_rest, force_at_rest, start_of
 from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
-from truenorth.records.base import GAP_FACTOR
+from truenorth.records.base import GAP_FACTOR, Late
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.layout import DP, DV
@@ -382,9 +382,9 @@ class Navigator:
             track, wanders = known_as_followed(track, receiver, self.altitude, self.start)
         slow = {str(item.figures["name"]) for item in wanders}
         evidence = [*innovation_evidence(track.residuals, last_sigma(track), in_sigma=slow), *wanders, *self._why]
-        result = Navigation(
-            "navigated", (), track, self.altitude, False, tuple(self._gaps), 0, self._imu_source, "live"
-        )
+        gaps, late = tuple(self._gaps), dict[str, Late]()
+        how = (self.altitude, False, gaps, 0, self._imu_source, "live", late, None)
+        result = Navigation("navigated", (), track, *how, *acting_at_rest(self.start, self.spec))
         return judged_navigation(result, evidence)
 
     def _reasons(self, result: Navigation) -> tuple[str, ...]:

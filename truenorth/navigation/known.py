@@ -24,19 +24,22 @@ from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
+from truenorth.navigation.departure import UNSEEN_GAIN, leaves_at
 from truenorth.navigation.start import moving_start, start_from_alignment
 from truenorth.quality.held import as_sampled
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import note
-from truenorth.state.layout import PHI
+from truenorth.state.layout import DV, PHI
 from truenorth.state.prior import positive, prior_covariance
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
 
 SHORTEST_LEVEL, LONGEST_LEVEL = 5.0, 120.0  # s of log, from which the level is taken
+BIASED = 3.0  # sigmas
+SHORTEST_SWAY = 60.0  # s: less does not show whether a base that sways also goes
 VELOCITY_SIGMA = 0.1  # m/s, of a vehicle whose attitude is given whole
 LEVEL_SIGMA = math.radians(0.5)
 
@@ -197,7 +200,9 @@ def known_start(
     if (pitch is None) != (roll is None):
         raise UsageError("pitch or roll is given alone; expected both, or none: the level then comes from the log")
     if pitch is None or roll is None:
-        return start_from_alignment(with_heading(align(_resting(log), at, spec), heading, sigma))
+        answer, departs = _levelled(log, at, spec)
+        start = start_from_alignment(with_heading(answer, heading, sigma))
+        return _may_have_left(start) if departs else start
     if not (sigma > 0.0 and level_sigma > 0.0 and velocity_sigma > 0.0):
         raise UsageError(f"sigmas {sigma:g}, {level_sigma:g} rad, {velocity_sigma:g} m/s; expected all above zero")
     C_nb = dcm_from_euler(heading, pitch, roll)
@@ -281,13 +286,41 @@ def start_from_master(
     return replace(start, time=float(master.time[row]))
 
 
-def _resting(record: ImuRecord) -> ImuRecord:
-    """The beginning of the log, in which the vehicle goes nowhere."""
-    begin = float(record.time[0])
-    goes = [r.start for r in motion_summary(record).regimes if r.kind in ("moving", "rotating")]
-    end = min([begin + LONGEST_LEVEL, float(record.time[-1]), *(start - SEEN_LATE for start in goes)])
-    if end - begin < SHORTEST_LEVEL:
-        raise AlignmentError(
-            f"{record.source}: the vehicle moves from {end:.1f} s on; {SHORTEST_LEVEL:g} s at rest are needed: give pitch and roll"
-        )
-    return record.between(None, end)
+def _may_have_left(start: Start) -> Start:
+    """The start of a vehicle that departs soon: it may have gained what is not plain yet."""
+    P = start.P.copy()
+    P[DV, DV] += np.diag([UNSEEN_GAIN, UNSEEN_GAIN, 0.0]) ** 2
+    return replace(start, P=P)
+
+
+def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> tuple[Alignment, bool]:
+    """The level by the beginning of the log, in which the vehicle goes nowhere, and whether it departs after that.
+
+    One that sways in the sea may seem to move.
+    """
+    begin, regimes = float(record.time[0]), motion_summary(record).regimes
+    longest = min(begin + LONGEST_LEVEL, float(record.time[-1]))
+    start = record.between(None, longest)
+    kinds = ("moving",) if _turns_as_biased(start, spec) else ("moving", "rotating")
+    end = min([longest, *(r.start - SEEN_LATE for r in regimes if r.kind in kinds)])
+    leaves = leaves_at(start)
+    if end - begin >= SHORTEST_LEVEL:
+        end = end if leaves is None else min(end, max(leaves, begin + SHORTEST_LEVEL))
+        return align(record.between(None, end), place, spec), end < longest
+    turns = any(r.kind == "rotating" and r.start < longest for r in regimes)
+    if leaves is None and not turns and longest - begin >= SHORTEST_SWAY:
+        answer = align(start, place, spec)
+        if answer.status in ("aligned", "level_only"):
+            return answer, False
+    first = max(1.0, end + SEEN_LATE - begin)
+    raise AlignmentError(
+        f"{record.source}: the vehicle moves within the first {first:.0f} s; {SHORTEST_LEVEL + SEEN_LATE:g} s at rest are needed, "
+        "or a minute in which it only sways: give pitch and roll"
+    )
+
+
+def _turns_as_biased(record: ImuRecord, spec: ImuSpec) -> bool:
+    """The gyros turn from the first seconds on, by no more than they may be biased; what turns later is seen to leave."""
+    first = record.between(None, float(record.time[0]) + SHORTEST_LEVEL)
+    rate = first.gyro.mean(axis=0) / (first.interval if first.kind == "increments" else 1.0)
+    return bool((np.abs(rate) < EARTH_RATE + BIASED * np.sqrt(spec.bias_variance[:3])).all())

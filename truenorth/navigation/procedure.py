@@ -46,7 +46,7 @@ from truenorth.navigation.given import (
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
-from truenorth.navigation.start import force_at_rest, of_poorer, start_of
+from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
@@ -54,7 +54,7 @@ from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.held import as_sampled
-from truenorth.quality.innovations import innovation_evidence
+from truenorth.quality.innovations import contradicted, innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
@@ -226,6 +226,7 @@ def _by_specification(
         evidence += seen
     else:
         evidence += burst_evidence(record)
+    force, acting = acting_at_rest(plan.start, noise)
     result = Navigation(
         status="navigated",
         evidence=(),
@@ -237,6 +238,8 @@ def _by_specification(
         imu_source=imu_source,
         source=record.source,
         late=late,
+        force=force,
+        acting=acting,
     )
     if damping is None:
         return judged_navigation(result, counted_once(evidence), least)
@@ -360,8 +363,10 @@ def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evide
         track = run(part)
         later = delayed(replace(plan, record=part), open_, track)
         if later is not open_:
-            aiding = on_springs(plan.sources(later))
+            usual, whole, aiding = aiding, track, on_springs(plan.sources(later))
             track = run(part)
+            if contradicted(track.residuals) and not contradicted(whole.residuals):  # that was no delay
+                aiding, track = usual, whole
     except DataError:  # the filter broke down: no explanation
         return []
     return gyro_delay_evidence(run, track, part)

@@ -16,11 +16,12 @@ from truenorth.core.attitude import angle_text, euler_from_dcm, euler_sigma, to_
 from truenorth.core.earth import radii
 from truenorth.core.shown import Shown
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
+from truenorth.errors.axes import proper_bias, standing
 from truenorth.quality.innovations import mean_nis
 from truenorth.records import Late
 from truenorth.state.evidence import NO_EFFECT, Effect, Evidence
 from truenorth.state.judge import Claim, judge
-from truenorth.state.layout import BA, BG, DP, DV, PHI
+from truenorth.state.layout import BG, DP, DV, PHI, SLOW_GYRO
 from truenorth.state.track import Residuals, Track
 from truenorth.state.wording import sentences
 
@@ -62,6 +63,9 @@ class Navigation(Shown):
         Of each aiding log with rows that stood out of order: how many were put in order.
     damping : Damping or None
         How its oscillations were damped, and what the velocity log did.
+    force, acting : (3,) arrays, m/s^2 and its square
+        Specific force at rest, body axes, whose effect through scale factors and misalignments the bias states hold; and
+        the variance of that effect, where those are no states.
     """
 
     status: Status
@@ -75,6 +79,8 @@ class Navigation(Shown):
     source: str
     late: Mapping[str, Late] = field(default_factory=dict)
     damping: Damping | None = None
+    force: Array = field(default_factory=standing, repr=False)
+    acting: Array = field(default_factory=lambda: np.zeros(3), repr=False)
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
@@ -165,11 +171,13 @@ class Navigation(Shown):
             columns[f"sigma_V{axis}"] = self.v_sigma[:, i]
         for i, angle in zip((2, 1, 0), ("roll", "pitch", "heading")):
             columns[f"{angle}_sigma"] = np.degrees(self.euler_sigma[:, i])
+        gyro_sigma = t.bias_sigma(BG, SLOW_GYRO)
+        accel_bias, accel_sigma = proper_bias(t, self.force, self.acting)
         for i, axis in enumerate("xyz"):
             columns[f"gyro_bias_{axis}_deg_h"] = t.gyro_bias[:, i] / DEG_PER_HOUR
-            columns[f"gyro_bias_{axis}_sigma_deg_h"] = t.sigma[:, BG][:, i] / DEG_PER_HOUR
-            columns[f"accel_bias_{axis}_ug"] = t.accel_bias[:, i] / MICRO_G
-            columns[f"accel_bias_{axis}_sigma_ug"] = t.sigma[:, BA][:, i] / MICRO_G
+            columns[f"gyro_bias_{axis}_sigma_deg_h"] = gyro_sigma[:, i] / DEG_PER_HOUR
+            columns[f"accel_bias_{axis}_ug"] = accel_bias[:, i] / MICRO_G
+            columns[f"accel_bias_{axis}_sigma_ug"] = accel_sigma[:, i] / MICRO_G
         for group, where in t.layout.groups.items():
             for i, column in enumerate(range(where.start, where.stop)):
                 name = group.replace(" ", "_") + (f"_{i + 1}" if where.stop - where.start > 1 else "")

@@ -29,6 +29,8 @@ from truenorth.state.state import Start, State
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
+    from truenorth.alignment.moving import Moving
+    from truenorth.alignment.transfer_result import Transfer
 
 Array = NDArray[np.float64]
 
@@ -79,7 +81,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
             moving.v_n,
             moving.P,
             alignment.gyro_bias,
-            alignment.accel_bias,
+            _acting(alignment, moving),
             alignment.position,
             alignment.imu,
             moving.known,
@@ -107,6 +109,11 @@ def start_from_alignment(alignment: Alignment) -> Start:
         alignment.disturbance,
         alignment.duration,
     )
+
+
+def _acting(alignment: Alignment, moving: Moving | Transfer) -> Array:
+    """What acts as the accelerometers' bias: navigation goes on with it."""
+    return alignment.accel_bias if moving.acting_bias is None else moving.acting_bias
 
 
 def _start(
@@ -184,6 +191,12 @@ def moving_start(
 def force_at_rest(start: Start) -> Array:
     """(3,) m/s^2, body axes; on what differs from it the accelerometers' axes act: as the IMU stands, or as they were estimated."""
     return start.force if ACCEL_AXES in start.known else standing(start.C_nb)
+
+
+def acting_at_rest(start: Start, spec: ImuSpec) -> tuple[Array, Array]:
+    """That force, and the variance of what it makes of scale factors and misalignments by a specification, (m/s^2)^2."""
+    force = force_at_rest(start)
+    return force, spec.acting_variance(force)
 
 
 def of_poorer(start: Start, spec: ImuSpec, other: ImuSpec) -> Start:
@@ -339,5 +352,6 @@ def navigation_block(alignment: Alignment) -> dict[str, Any]:
     moving = alignment.moving or alignment.transfer
     if moving is not None:
         block |= {"v_n": moving.v_n.tolist(), "P": moving.P.tolist(), "force": moving.force.tolist()}
+        block["accel_bias"] = _acting(alignment, moving).tolist()
         block["known"] = {name: values.tolist() for name, values in moving.known.items()}
     return block

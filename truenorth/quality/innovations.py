@@ -111,6 +111,11 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
     return found
 
 
+def contradicted(sources: Iterable[Residuals]) -> bool:
+    """Whether most of what one of them measured contradicts the track."""
+    return any(map(_mostly_rejected, sources))
+
+
 def _mostly_rejected(source: Residuals) -> bool:
     return int(np.sum(~source.used)) > limit("rejected") * len(source.time)
 

@@ -154,6 +154,13 @@ class Track:
         """(K, 3) m/s^2."""
         return self.bias(BA, SLOW_ACCEL)
 
+    def bias_sigma(self, group: slice, slow: str) -> Array:
+        """(K, 3) one-sigma of :meth:`bias`."""
+        J = np.eye(self.layout.states)[group]
+        if (own := self.layout.slice_of(slow)) is not None:
+            J[:, own] += np.eye(3)
+        return np.sqrt(np.maximum(np.einsum("ij,kjl,il->ki", J, self.P, J), 0.0))
+
     @property
     def sigma(self) -> Array:
         """(K, n) one-sigma of the errors."""

@@ -1,0 +1,75 @@
+"""A start at rest ends before the vehicle departs, however gently; a base that sways in the sea is at rest."""
+
+import math
+
+import numpy as np
+import pytest
+
+import truenorth as tn
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.navigation.departure import leaves_at
+from truenorth.simulation import rest, simulate
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import accelerate, straight, turn
+from truenorth.simulation.sway import Disturbed
+from truenorth.simulation.tones import Tone
+
+PLACE = tn.Position.from_degrees(48.0, 11.0, 500.0)
+HEADING, SIGMA = math.radians(123.0), math.radians(0.5)
+STILL = 30.0  # s
+GRADES = ("tactical", "industrial", "consumer")
+
+
+def _off(start, motion):
+    """What a start is off by, in its sigmas: level and velocity."""
+    true = motion.states(start.time)
+    tilt = -rotation_vector_from_dcm(start.C_nb @ true.C_nb.T)
+    sigma = np.sqrt(np.diag(start.P))
+    return np.abs(np.append(tilt[:2], start.v_n - true.v_n)) / np.append(sigma[:2], sigma[3:6])
+
+
+@pytest.mark.parametrize("imu", GRADES)
+@pytest.mark.parametrize(("acceleration", "onset"), [(0.3, 15.0), (0.6, 8.0)])
+def test_a_gentle_departure_ends_the_rest(imu, acceleration, onset):
+    """A train gains half a metre a second in five to ten seconds; a look of half a minute takes that for a tilt."""
+    motion = course(
+        PLACE, [*straight(STILL), *accelerate(12.0, acceleration, 0.0, onset), *straight(60.0)], heading=HEADING
+    )
+    log = simulate(motion, rate=50.0, duration=90.0, imu=imu, seed=5).record
+    start = tn.known_start(log, PLACE, imu, HEADING, SIGMA)
+    assert start.time <= STILL + 0.2 * onset
+    assert (_off(start, motion) < 4.0).all()
+    time = np.arange(1.0, 89.0)
+    s = motion.states(time)
+    fixes = tn.GnssRecord(time, s.lat, s.lon, s.alt, s.v_n)
+    assert tn.navigate(log, start, aid=tn.Gnss(fixes), imu=imu).status == "navigated"
+
+
+def test_a_base_that_begins_to_turn_leaves():
+    """A crane turns where it stands."""
+    motion = course(
+        PLACE, [*straight(STILL), *turn(math.radians(90.0), math.radians(6.0)), *straight(20.0)], heading=HEADING
+    )
+    log = simulate(motion, rate=50.0, duration=60.0, imu="consumer", seed=6).record
+    assert 15.0 < leaves_at(log) <= STILL
+
+
+@pytest.mark.parametrize("imu", [*GRADES, "navigation"])
+def test_a_base_that_stays_does_not_leave(imu):
+    for seed in range(5):
+        log = simulate(rest(PLACE, HEADING, 0.02, -0.03), rate=50.0, duration=120.0, imu=imu, seed=seed).record
+        assert leaves_at(log) is None
+
+
+def test_a_buoy_is_at_rest():
+    """The waves push it by metres a second; it goes nowhere."""
+    roll = (Tone(math.radians(8.0), 5.0, 0.3), Tone(math.radians(5.0), 6.3, 1.0))
+    east = (Tone(0.6, 5.0, 0.1), Tone(0.4, 6.3, 2.0))
+    still = rest(PLACE, HEADING, 0.02, -0.03)
+    motion = Disturbed(
+        roll_tones=roll, pitch_tones=roll[::-1], east_tones=east, north_tones=east, up_tones=east, motion=still
+    )
+    log = simulate(motion, rate=50.0, duration=150.0, imu="industrial", seed=7).record
+    start = tn.known_start(log, PLACE, "industrial", HEADING, SIGMA)
+    assert start.time == pytest.approx(120.0, abs=1.0)
+    assert (_off(start, motion) < 4.0).all()

@@ -1,0 +1,63 @@
+"""Until when the beginning of a log goes nowhere: the speed that it gains, since a gentle departure looks like a tilt for long.
+
+A train or a ship gains 0.1 m/s^2 within ten seconds. To a look of half a minute that is a level which drifts. So the mean of
+the specific force over the first half of a span foretells the second half. What it misses there, summed up, is a speed gained: of a
+level that drifts steadily eight times what the first half itself wanders by, of white noise some two to three times. A vehicle that
+sways or is pushed wanders by as much in both halves. The force is looked at twice, in axes of the body, to which poor gyros do no
+harm, and carried by the gyros into axes that do not turn, in which no tilt looks like a push; a departure shows in both. A turn
+shows in the gyros in the same way.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.quality.regimes import motion_summary
+from truenorth.quality.signals import even_rates, second_means, unturned
+from truenorth.records import ImuRecord
+
+Array = NDArray[np.float64]
+
+LEAST_GAIN = 0.03  # m/s: what people getting in, and a vehicle that settles on its springs, leave
+LEAST_TURN = np.radians(0.3)
+WANDERS = 10.0  # times what the first half wanders by
+GONE = 0.5  # of the gain that is plain: where it begins to rise
+UNSEEN_GAIN = GONE * LEAST_GAIN  # m/s: of which nothing is seen
+BACK = 2.4  # times from there to where it is plain: of a push that grows, half the speed is gained in 0.7 to 0.8 of the time
+SHORTEST = 10  # s: two halves of five
+
+
+def leaves_at(record: ImuRecord) -> float | None:
+    """When a base begins to gain speed or to turn, s on the record's clock; None where it does not, or the log is below 10 s."""
+    motion = motion_summary(record)
+    if len(motion.time) < SHORTEST:
+        return None
+    interval, rates = even_rates(record)
+    per_second = max(1, round(1.0 / interval))
+    rates = rates[:, : len(motion.time) * per_second]
+    steady = second_means(unturned((rates[:3] - motion.rate_bias[:, None]) * interval, rates[3:]), per_second)
+    views = [_level(steady), _level(second_means(rates[3:], per_second))]
+    turns = second_means(rates[:3], per_second)
+    calm = SHORTEST
+    for span in range(SHORTEST, len(motion.time) + 1):
+        share = max(min(_share(level[:, :span], LEAST_GAIN) for level in views), _share(turns[:, :span], LEAST_TURN))
+        if share > 1.0:
+            return float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
+        if share <= GONE:
+            calm = span
+    return None
+
+
+def _level(force: Array) -> Array:
+    """(3, m) what of a specific force is level, as the base stands in the first seconds."""
+    up = force[:, : SHORTEST // 2].mean(axis=1)
+    up /= np.linalg.norm(up)
+    return np.asarray(force - np.outer(up, up @ force))
+
+
+def _share(rate: Array, least: float) -> float:
+    """What the second half gains by a rate (3, m) beyond the first half's, as a share of what is plain."""
+    half = rate.shape[1] // 2
+    gained = np.linalg.norm(np.cumsum(rate - rate[:, :half].mean(axis=1)[:, None], axis=1), axis=0)
+    return float(gained[-1] / (least + WANDERS * gained[:half].max()))
