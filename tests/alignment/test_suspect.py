@@ -84,7 +84,7 @@ def test_biases_that_are_together_too_large_are_in_sigma(sound):
 @pytest.mark.parametrize(("size", "first"), [(0.05, "specification"), (0.25, "imu_axes")])
 def test_a_bias_of_a_quarter_of_g_says_that_axes_are_wrong(sound, size, first):
     """Of g: no specification makes it up, and no poorer one is tried."""
-    wrong = replace(sound, accel_bias=np.array([9.8 * size, 0.0, 0.0]), accel_bias_sigma=np.full(3, 0.01))
+    wrong = replace(sound, moving=replace(sound.moving, acting_bias=np.array([9.8 * size, 0.0, 0.0])))
     (item,) = [item for item in bias_evidence(wrong) if item.key == "bias.accel"]
     assert item.remedies[0] == first
     assert item.remedies[-1] == "specification"
