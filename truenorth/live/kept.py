@@ -20,9 +20,10 @@ from truenorth.live.log import Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.recent import Recent
+from truenorth.live.siblings import Siblings
 
 PLAIN: dict[str, type[Any]] = {
-    kind.__name__: kind for kind in (Log, Intake, Felt, Past, Recent, Carry, Going, NoiseSeen)
+    kind.__name__: kind for kind in (Log, Intake, Felt, Past, Recent, Carry, Going, NoiseSeen, Siblings)
 }
 PLAIN |= {kind.__name__: kind for kind in FEEDS.values()}  # type: ignore[misc]  # classes, called as functions
 
