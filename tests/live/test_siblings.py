@@ -8,7 +8,7 @@ from tests.runs import some
 from truenorth.core.attitude import misalignment
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
-from truenorth.live import GnssFeed, Navigator, siblings
+from truenorth.live import GnssFeed, Navigator, navigator, siblings
 from truenorth.navigation import navigate
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import Sway, Tone, simulate
@@ -119,6 +119,16 @@ def test_chunks_and_questions_change_no_bit_nor_does_a_run_that_was_saved(tmp_pa
     assert any("no acceleration shows it" in reason for reason in first["reasons"])
     assert silent.answer.summary() == first
     assert saved.answer.summary() == again.answer.summary() == first
+
+
+def test_a_run_that_was_saved_without_them_is_of_another_version(tmp_path, monkeypatch):
+    """It would go on without the comparison, in silence."""
+    case = Anchored(STILL, "consumer", 10.0, 1)
+    monkeypatch.setattr(navigator, "KEPT", tuple(name for name in navigator.KEPT if name != "_siblings"))
+    case.run().save(tmp_path / "run.npz")
+    monkeypatch.undo()
+    with pytest.raises(DataError, match="not a result of this version"):
+        Navigator.load(tmp_path / "run.npz")
 
 
 def test_the_track_of_a_run_too_long_to_be_kept_is_as_unsure_along_the_way():

@@ -248,7 +248,7 @@ class Navigator:
         DataError
             No such file, a damaged one, or one of another kind.
         """
-        state = kept(path, "Navigator")
+        state = kept(path, "Navigator", KEPT)
         feeds, mountings = list(state["feeds"].values()), state["_mountings"]
         start = state["_given"] or state["start"]
         found = cls(
