@@ -77,7 +77,6 @@ def test_heading_without_a_push_is_as_unsure_as_its_gyro(motion, grade, duration
     answers = case.feed(case.run(), 125, every=5.0)
     assert {a.status for a in answers} == {"navigated"}
     assert np.abs(case.off(answers)).max() < 4.0
-    assert any("no acceleration shows it" in reason for reason in answers[-1].reasons)
 
 
 @pytest.mark.parametrize("seed", some([1], [2, 3, 4]))
