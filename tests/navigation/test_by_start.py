@@ -8,8 +8,9 @@ import pytest
 from benchmarks.honesty.circling import drawn_start, received
 from tests.runs import some
 from truenorth.core.position import Position
+from truenorth.filters import LinearSystem, kalman
 from truenorth.navigation import navigate
-from truenorth.navigation.by_start import UP, _moved, _shifts, start_evidence
+from truenorth.navigation.by_start import UP, Others, _moved, _shifts, start_evidence, stretch
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import Sway, Tone, simulate
 from truenorth.state.layout import BG
@@ -86,3 +87,44 @@ def test_a_linear_answer_is_left_as_it_is():
     evidence, growth = start_evidence(lambda _: answer.track, start, answer.track)
     assert evidence == []
     np.testing.assert_array_equal(growth, 1.0)
+
+
+def test_a_linear_filter_moves_by_no_more_than_its_sigma():
+    """``sum d_i d_i' <= P`` of starts that are off by ``delta_i``, ``sum delta_i delta_i' <= P0``, whatever it is measured."""
+    rng = np.random.default_rng(2)
+    n, count = 5, 40
+    Phi = np.linalg.qr(rng.standard_normal((n, n)))[0]
+    A, H = rng.standard_normal((n, n)), rng.standard_normal((1, n)) * np.array([0.0, 0.0, 1.0, 1.0, 1.0])
+    system = LinearSystem(
+        Phi=Phi[None],
+        Q=1e-3 * np.eye(n)[None],
+        H=H[None],
+        R=np.array([[[0.1]]]),
+        z=rng.standard_normal((count, 1)),
+        x0=np.zeros(n),
+        P0=A @ A.T,
+    )
+    usual = kalman(system, history="full")
+    shifts = A @ np.linalg.qr(rng.standard_normal((n, n)))[0][:, :2]
+    d = np.stack([kalman(replace(system, x0=x), history="full").x - usual.x for x in shifts.T])
+    room = usual.P - np.einsum("ski,skj->kij", d, d)
+    assert np.linalg.eigvalsh(room).min() > -1e-9
+    assert np.sum(d[:, -1] ** 2) > 1e-6
+
+
+def test_up_to_now_is_what_a_log_that_ends_now_says():
+    """A running answer takes epochs one by one: its growth at each is that of the last epoch of the track until there."""
+    answer, _ = navigated(SWELL, "industrial", 60.0, 1)
+    start = drawn_start(SWELL, imu_spec("consumer"), np.random.default_rng(1))
+    others, track = Others.of(start), answer.track
+    sizes = np.array([1.0, 1.2, 1.6, 0.9, 0.4, 0.8, 1.4, 0.6, 0.3])[:, None]
+    moved = sizes[np.arange(len(track)) // 5 % len(sizes)] * track.sigma[:, :9]
+    most = 0.0
+    for k in range(len(track)):
+        one, until = track[k : k + 1], track[: k + 1]
+        np.testing.assert_array_equal(
+            others.growth(one, moved[k : k + 1], most)[-1], others.growth(until, moved[: k + 1])[-1]
+        )
+        most = stretch(one, moved[k : k + 1], most)
+    assert others.growth(track, moved)[15:20, UP].min() > 1.0  # .9 of sigma, after 1.6
+    np.testing.assert_array_equal(others.growth(track, moved)[25:30, UP], 1.0)  # .8, after .4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,10 @@ from truenorth.live.log import Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.recent import Recent
+from truenorth.live.siblings import Siblings
 
 PLAIN: dict[str, type[Any]] = {
-    kind.__name__: kind for kind in (Log, Intake, Felt, Past, Recent, Carry, Going, NoiseSeen)
+    kind.__name__: kind for kind in (Log, Intake, Felt, Past, Recent, Carry, Going, NoiseSeen, Siblings)
 }
 PLAIN |= {kind.__name__: kind for kind in FEEDS.values()}  # type: ignore[misc]  # classes, called as functions
 
@@ -35,17 +36,21 @@ def keep(path: str | PathLike[str], kind: str, state: Mapping[str, Any]) -> Path
     return target
 
 
-def kept(path: str | PathLike[str], kind: str) -> dict[str, Any]:
-    """What :func:`keep` wrote.
+def kept(path: str | PathLike[str], kind: str, names: Collection[str] = ()) -> dict[str, Any]:
+    """What :func:`keep` wrote, with all of these names.
 
     Raises
     ------
     DataError
-        No such file, a damaged one, or one of another kind.
+        No such file, a damaged one, or one of another kind or version.
     """
     state = read_archive(path)
     if not isinstance(state, dict) or state.pop("kind", None) != kind:
         raise DataError(f"{path}: holds no {kind}; expected a file that {kind}.save wrote")
+    if missing := sorted(set(names) - state.keys()):
+        raise DataError(
+            f"{path}: not a result of this version of Truenorth ({missing[0]}); write it again with this version"
+        )
     return {name: _unpacked(value) for name, value in state.items()}
 
 

@@ -23,9 +23,10 @@ from truenorth.alignment import Alignment
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import LoopState, Setting
-from truenorth.estimate.gaps import LONGEST_BRIDGE
+from truenorth.estimate.rivals import counted_once
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.answer import Answer, Motion
+from truenorth.live.bridges import bridges
 from truenorth.live.feed import Feed
 from truenorth.live.felt import Felt, without_known
 from truenorth.live.intake import LATE, Intake, as_rows
@@ -33,14 +34,16 @@ from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
+from truenorth.live.siblings import Siblings
 from truenorth.navigation import Navigation, navigate
+from truenorth.navigation.by_start import unsure_heading
 from truenorth.navigation.given import arm_as_begun, kept_altitude, mountings_found, turns_velocity
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.navigation.start import acting_at_rest, force_at_rest, start_of
 from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
-from truenorth.records.base import GAP_FACTOR, Late
+from truenorth.records.base import Late
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.layout import DP, DV
@@ -54,12 +57,11 @@ Array = NDArray[np.float64]
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
     "start", "spec", "_given", "_imu", "_imu_source", "feeds", "_mountings", "altitude", "intake", "log", "output", "failure",
-    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps", "_noise",
+    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps", "_noise", "_siblings",
 )  # fmt: skip
 FIRST = 20  # rows that show the interval of sampling
 STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
 NEWEST = 1000  # rows of a receiver that say how well a fix is known
-UNREST = 60.0  # s before a gap, whose motion says what may have happened in it
 
 
 class Navigator:
@@ -122,6 +124,7 @@ class Navigator:
         self._sent: dict[str, dict[str, float]] = {key: {} for key in self.feeds}
         self._gaps: list[tuple[float, float]] = []
         self._noise = NoiseSeen(self.spec, kind)
+        self._siblings = Siblings(self.start)
         self._lock = threading.Lock()
 
     def __repr__(self) -> str:
@@ -170,7 +173,7 @@ class Navigator:
             found = self._now()
         if found is None:
             return None
-        result = self._judged(found)
+        result = self._judged(*found)
         track = result.track
         sigma = track.sigma[-1]
         return Answer(
@@ -218,9 +221,10 @@ class Navigator:
             return replace(found, evidence=(*found.evidence, *silent))
         with self._lock:
             last = self._now()
-        if last is None:
-            raise DataError(self.failure)
-        return self._judged(self.past.with_end(last))
+            if last is None:
+                raise DataError(self.failure)
+            track, siblings, _ = last
+            return self._judged(self.past.with_end(track), self._siblings.along(siblings))
 
     def _kept_with(self, aids: Mapping[str, Aid]) -> Altitude | None:
         """How height is kept: as in the loop; where its sensor brought no height, as the aids allow."""
@@ -232,6 +236,8 @@ class Navigator:
     def save(self, path: str | PathLike[str]) -> Path:
         """Write all that the run goes on from, whole or not at all; see :meth:`load`."""
         with self._lock:
+            if self._setting is not None:
+                self._siblings.settle(self._setting)
             return keep(path, "Navigator", {name: getattr(self, name) for name in KEPT})
 
     @classmethod
@@ -243,7 +249,7 @@ class Navigator:
         DataError
             No such file, a damaged one, or one of another kind.
         """
-        state = kept(path, "Navigator")
+        state = kept(path, "Navigator", KEPT)
         feeds, mountings = list(state["feeds"].values()), state["_mountings"]
         start = state["_given"] or state["start"]
         found = cls(
@@ -268,7 +274,10 @@ class Navigator:
         """Make the loop ready, when enough rows are there to know their interval."""
         self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
         self._setting = self._set()
-        self._state = begin(self._setting, self.start, float(rows[0, 0]) - self._interval, self._interval)
+        time = float(rows[0, 0]) - self._interval
+        self._state = begin(self._setting, self.start, time, self._interval)
+        if self.feeds:  # else errors grow as the start says
+            self._siblings.begin(self._setting, time, self._interval)
 
     def _set(self) -> Setting:
         sources: list[Aiding] = []
@@ -302,13 +311,19 @@ class Navigator:
         assert self._setting is not None
         assert self._state is not None
         try:
-            aiding = [*self._measurements(), *self._bridges(part), self._noise.growth(part)]
-            self._state, track = go_on(self._setting, self._state, self._samples(part), aiding)
+            begins = self._loop_end == self.start.time
+            measured = self._measurements()
+            bridged, gaps = bridges(part[:, 0], self._loop_end, self._interval, self.log, begins=begins)
+            self._gaps += gaps
+            aiding = [*measured, *bridged, self._noise.growth(part)]
+            samples = self._samples(part)
+            self._state, track = go_on(self._setting, self._state, samples, aiding)
         except DataError as error:
             self.failure = str(error)
             return
         self._loop_end = float(part[-1, 0])
         self.past.add(track)
+        self._siblings.take(self._setting, samples, aiding, track)
 
     def _samples(self, rows: Array) -> ImuRows:
         return ImuRows(rows[:, 0], rows[:, 1:4], rows[:, 4:], self.log.source_kind, "live")
@@ -324,55 +339,26 @@ class Navigator:
                 self.past.note(feed.key, str(error))
         return found
 
-    def _bridges(self, part: Array) -> list[Aiding]:
-        """What the vehicle may have done in gaps among these rows.
-
-        Raises
-        ------
-        DataError
-            A gap that is too long.
-        """
-        steps = np.diff(part[:, 0], prepend=self._loop_end)
-        rows = np.flatnonzero(steps > GAP_FACTOR * self._interval)
-        if not rows.size or (self._loop_end == self.start.time and rows.tolist() == [0]):
-            return []
-        missing = steps[rows] - self._interval
-        if missing.max() > LONGEST_BRIDGE:
-            raise DataError(
-                f"a gap of {steps[rows].max():.3f} s in the rows of the IMU; expected {LONGEST_BRIDGE:g} s at most: what the "
-                "vehicle did in it is not known; align again"
-            )
-        self._gaps += [(float(part[row, 0] - steps[row]), float(steps[row])) for row in rows]
-        before = self.log.record(self.log.end - UNREST)
-        scale = 1.0 if before.kind == "rates" else 1.0 / before.interval
-        turn, push = (
-            missing[:, None] * float(np.std(values * scale, axis=0).max()) for values in (before.gyro, before.accel)
-        )
-        return [Aiding.disturbance("gap", part[rows, 0], push, turn)]
-
-    def _now(self) -> Track | None:
-        """One row: the loop carried over the rows that wait, which it does not take."""
+    def _now(self) -> tuple[Track, list[Track], float] | None:
+        """One epoch: the loop carried over the rows that wait, which it does not take; siblings there, and how far they were."""
         if self._state is None or self._setting is None:
             return None
         waiting = np.vstack(self._waiting) if self._waiting else np.empty((0, 7))
         waiting = waiting[waiting[:, 0] > self._loop_end]
-        if not len(waiting) or self.failure:
-            return self.past.last
-        _, track = go_on(self._setting, self._state, self._samples(waiting), last=True)
-        last = slice(len(track.time) - 1, None)
-        return replace(
-            track,
-            time=track.time[last],
-            C_nb=track.C_nb[last],
-            v_n=track.v_n[last],
-            position=track.position[last],
-            sensors=track.sensors[last],
-            P=track.P[last],
-            residuals=(),
-        )
+        samples = None if not len(waiting) or self.failure else self._samples(waiting)
+        if samples is None:
+            found = self.past.last
+        else:
+            found = go_on(self._setting, self._state, samples, last=True)[1][-1:]
+        if found is None:
+            return None
+        return found, self._siblings.now(self._setting, float(found.time[0]), samples), self._siblings.most
 
-    def _judged(self, track: Track) -> Navigation:
-        """The verdict on the loop's track, position known no better than by a fix where nobody spoke of slow errors."""
+    def _judged(self, track: Track, siblings: Sequence[Track], most: float = 0.0) -> Navigation:
+        """The verdict on the loop's track, position known no better than by a fix where nobody spoke of slow errors.
+
+        Heading is known no better than siblings leave it; `most`: how far they were before this track.
+        """
         track = replace(track, residuals=self.past.residuals)
         receiver = (
             None if Gnss.key not in self.feeds else self.feeds[Gnss.key].newest(NEWEST, self._mountings.get(Gnss.key))
@@ -385,7 +371,12 @@ class Navigator:
         gaps, late = tuple(self._gaps), dict[str, Late]()
         how = (self.altitude, False, gaps, 0, self._imu_source, "live", late, None)
         result = Navigation("navigated", (), track, *how, *acting_at_rest(self.start, self.spec))
-        return judged_navigation(result, evidence)
+        growth = None
+        if siblings:
+            others = self._siblings.others
+            growth = others.growth(track, others.moved(track, siblings), most)
+            evidence += unsure_heading(track, growth)
+        return judged_navigation(result, counted_once(evidence), growth)
 
     def _reasons(self, result: Navigation) -> tuple[str, ...]:
         more = [self.failure, self.intake.counts.words(), *self.past.notes.values()]

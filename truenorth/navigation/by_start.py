@@ -21,8 +21,8 @@ given heading as they were. The rule is ours.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,47 @@ NEAR = 0.1  # rad: further off, a start may lose the track that the answer keeps
 SEEN = 0.5  # of sigma: where answers differ by less, the log has shown heading
 
 
+@dataclass(frozen=True)
+class Others:
+    """Starts that are one sigma off, or part of it, together within the prior."""
+
+    starts: tuple[Start, ...]
+    parts: tuple[float, ...]  # of a sigma
+    time: float  # s; of the start
+    variance: Array  # (2, 2) of heading and of the gyro about the vertical
+
+    @classmethod
+    def of(cls, start: Start) -> Others:
+        """Those of a start."""
+        shifts, variance = _shifts(start)
+        parts = [min(1.0, NEAR / max(float(np.linalg.norm(shift[PHI])), 1e-300)) for shift in shifts.T]
+        starts = tuple(_moved(start, part * shift) for part, shift in zip(parts, shifts.T, strict=True))
+        return cls(starts, tuple(parts), start.time, variance)
+
+    def free(self, time: Array) -> Array:
+        """(K,) one sigma of heading, rad, as the start and its gyro alone leave it."""
+        t, P = time - self.time, self.variance
+        return np.sqrt(np.maximum(P[0, 0] + 2.0 * t * P[0, 1] + t**2 * P[1, 1], 0.0))
+
+    def moved(self, track: Track, others: Sequence[Track]) -> Array:
+        """(K, 9) by how much the answers from these starts, together, differ from the track: phi, dv, dp."""
+        squares = np.zeros((len(track), 9))
+        for other, part in zip(others, self.parts, strict=True):
+            squares += (track.errors_against(other, nearest(other.time, track.time)) / part) ** 2
+        return np.sqrt(squares)
+
+    def growth(self, track: Track, moved: Array, most: float = 0.0) -> Array:
+        """(K, 9) by how many times sigmas grow; `most`: see :func:`stretch`."""
+        sigma, free = track.sigma[:, :9], self.free(track.time)
+        if free[-1] < LINEAR:
+            return np.ones_like(sigma)
+        safe = np.where(sigma > 0.0, sigma, np.inf)
+        growth = np.maximum(moved / safe, 1.0)
+        more = np.where(_unseen(track, moved, most), np.maximum(free**2 - sigma[:, UP] ** 2, 0.0), 0.0)
+        along = track.P[:, :9, UP] * np.sqrt(more)[:, None] / safe[:, UP, None] ** 2
+        return np.maximum(growth, np.sqrt(1.0 + along**2 / safe**2))
+
+
 def start_evidence(run: Callable[[Start], Track], start: Start, track: Track) -> tuple[list[Evidence], Array]:
     """What the log does not show of heading though the filter says so, and by how much sigmas of phi, dv and dp grow for it.
 
@@ -63,41 +104,45 @@ def start_evidence(run: Callable[[Start], Track], start: Start, track: Track) ->
     growth : (K, 9) array
         Times one sigma, along the way; ones where the answer depends on the start as sigma says.
     """
-    sigma, none = track.sigma[:, :9], np.ones((len(track), 9))
-    shifts, variance = _shifts(start)
-    t = track.time - start.time
-    free = np.sqrt(np.maximum(variance[0, 0] + 2.0 * t * variance[0, 1] + t**2 * variance[1, 1], 0.0))
-    if free[-1] < LINEAR:
+    others, none = Others.of(start), np.ones((len(track), 9))
+    if others.free(track.time[-1:])[0] < LINEAR:
         return [], none
-    moved = np.zeros_like(sigma)
-    for shift in shifts.T:
-        part = min(1.0, NEAR / max(float(np.linalg.norm(shift[PHI])), 1e-300))
-        try:
-            other = run(_moved(start, part * shift))
-        except DataError:  # the filter broke down: nothing to compare
-            return [], none
-        moved += (track.errors_against(other, nearest(other.time, track.time)) / part) ** 2
-    squares = moved / np.where(sigma > 0.0, sigma, np.inf) ** 2
-    growth = np.sqrt(np.maximum(squares, 1.0))
-    unseen = _unseen(np.sqrt(squares[:, UP]))
-    more = np.where(unseen, np.maximum(free**2 - sigma[:, UP] ** 2, 0.0), 0.0)
-    along = (
-        track.P[:, :9, UP] * np.sqrt(more)[:, None] / np.where(sigma[:, UP] > 0.0, sigma[:, UP] ** 2, np.inf)[:, None]
-    )
-    growth = np.maximum(growth, np.sqrt(1.0 + along**2 / np.where(sigma > 0.0, sigma, np.inf) ** 2))
-    last = float(growth[-1, UP])
+    try:
+        tracks = [run(other) for other in others.starts]
+    except DataError:  # the filter broke down: nothing to compare
+        return [], none
+    growth = others.growth(track, others.moved(track, tracks))
+    return unsure_heading(track, growth), growth
+
+
+def unsure_heading(track: Track, growth: Array) -> list[Evidence]:
+    """What there is to say of a heading whose sigma grows so."""
+    sigma, last = float(track.sigma[-1, UP]), float(growth[-1, UP])
     if last < limit("depends on its start"):
-        return [], growth
-    figures = {"sigma": float(sigma[-1, UP]), "grown": float(sigma[-1, UP]) * last}
-    return [note("heading.by_start", "manoeuvre_gnss", "stops", urgent=True, **figures)], growth
+        return []
+    return [note("heading.by_start", "manoeuvre_gnss", "stops", urgent=True, sigma=sigma, grown=sigma * last)]
 
 
-def _unseen(moved: Array) -> NDArray[np.bool_]:
+def stretch(track: Track, moved: Array, most: float = 0.0) -> float:
+    """The most sigmas that heading has moved by since the log last showed it; `most`: before the first of these epochs."""
+    for ratio in _in_sigma(track, moved):
+        most = max(most, float(ratio)) if ratio > SEEN else 0.0
+    return most
+
+
+def _in_sigma(track: Track, moved: Array) -> Array:
+    sigma = track.sigma[:, UP]
+    return moved[:, UP] / np.where(sigma > 0.0, sigma, np.inf)
+
+
+def _unseen(track: Track, moved: Array, most: float) -> NDArray[np.bool_]:
     """(K,) stretches in which the log has not shown heading, and answers differ by too much somewhere."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], moved > SEEN, [False]]).astype(np.int8)))
-    unseen = np.zeros(len(moved), dtype=np.bool_)
+    ratio = _in_sigma(track, moved)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], ratio > SEEN, [False]]).astype(np.int8)))
+    unseen = np.zeros(len(ratio), dtype=np.bool_)
     for begin, end in edges.reshape(-1, 2):
-        unseen[begin:end] = moved[begin:end].max() > limit("depends on its start")
+        largest = max(ratio[begin:end].max(), most if begin == 0 else 0.0)
+        unseen[begin:end] = largest > limit("depends on its start")
     return unseen
 
 
