@@ -26,7 +26,7 @@ from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
 from truenorth.quality.stamps import with_scatter
-from truenorth.quality.swing import UNSEEN_ARM, shown_arm, swing, unseen_swing, with_unseen_arm
+from truenorth.quality.swing import UNSEEN_ARM, is_swung_late, shown_arm, swing, unseen_swing, with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -59,6 +59,7 @@ class Plan:
     slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
     factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
     swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
+    late: bool = False  # what the receiver shows late is its antenna's slow swing, too
     unseen: float = 0.0  # share of that swing which is in their noise
     scattered: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
 
@@ -69,7 +70,7 @@ class Plan:
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
-        used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings), *self.always]
+        used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late), *self.always]
         return navigate_track(
             self.record,
             self.start,
@@ -91,6 +92,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     said: list[Evidence] = []
     asked = given
     track = plan.run(plan.sources(given), smooth=smooth)
+    plan, track = _with_late_swing(plan, given, track, smooth)
     plan, track = _with_swing_apart(plan, given, track, smooth)
     plan, track = _not_lost(plan, given, track, smooth)
     plan, track = _as_noisy(plan, given, track, smooth)
@@ -138,6 +140,22 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
             continue
         track = counted_between(track, name, given[key].mounting, asked[key].mounting)
     return plan, given, track, said
+
+
+def _with_late_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
+    """The plan whose receiver shows its antenna's slow swing as late as all else, where the log speaks for it; else the same ones.
+
+    First of all: a ship hardly pushes, and of a swell on a mast that no delay explains the filter loses its track. On rough ground
+    alone what little a slow part has of the quick swing looks like a delay, many times that of the receiver.
+    """
+    later = replace(plan, late=True)
+    if not any(source.name == SPEEDS and is_swung_late(source) for source in plan.sources(given)):
+        return plan, track
+    try:
+        other = later.run(later.sources(given), smooth=smooth)
+    except DataError:  # the filter broke down
+        return plan, track
+    return (later, other) if explained_by_two(other, track) else (plan, track)
 
 
 def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
