@@ -26,7 +26,15 @@ from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
 from truenorth.quality.stamps import with_scatter
-from truenorth.quality.swing import UNSEEN_ARM, is_swung_late, shown_arm, swing, unseen_swing, with_unseen_arm
+from truenorth.quality.swing import (
+    UNSEEN_ARM,
+    is_swung_late,
+    quick_part,
+    shown_arm,
+    swing,
+    unseen_swing,
+    with_unseen_arm,
+)
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -130,7 +138,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
         track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES), fixes)
-        track = with_open_arm(track)
+        track = with_open_arm(track, quick_swing(plan, given))
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
         if receiver.mounting is not None:
@@ -175,7 +183,13 @@ def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: b
     return (apart, other) if explained_by_two(other, track) else (plan, track)
 
 
-def _lost(track: Track) -> bool:
+def quick_swing(plan: Plan, given: Mapping[str, Aid]) -> Array:
+    """(3,) part of an antenna's arm that is shown by what its receiver may filter; all of it where there are no velocities."""
+    times = [source.time for source in plan.sources(given) if source.name == SPEEDS]
+    return quick_part(plan.record, times[0]) if times and len(times[0]) else np.ones(3)
+
+
+def lost(track: Track) -> bool:
     """Whether the gates of a track keep out more of a sensor's rows than chance and some jumps do."""
     return max((r.rejected / max(len(r.time), 1) for r in track.residuals), default=0.0) > limit("rejected")
 
@@ -188,7 +202,7 @@ def _not_lost(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> 
     """
     receiver = given.get(Gnss.key)
     if (
-        not _lost(track)
+        not lost(track)
         or not isinstance(receiver, Gnss)
         or not (antenna := receiver.mounting)
         or antenna.latency_sigma == 0.0
@@ -222,7 +236,7 @@ def _all_shown(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) ->
         quiet = shown.run(shown.sources(later), smooth=smooth)
     except DataError:  # the filter broke down
         return plan, given, track
-    return (plan, given, track) if _lost(quiet) or explained_by_two(track, quiet) else (shown, later, quiet)
+    return (plan, given, track) if lost(quiet) or explained_by_two(track, quiet) else (shown, later, quiet)
 
 
 def _with_unseen_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:

@@ -93,6 +93,19 @@ def unseen_arm(track: Track) -> tuple[Array, Array]:
     return d, 1.0 / np.sqrt(total)
 
 
+def quick_part(record: ImuRecord, time: Array) -> Array:
+    """(3,) part of an arm along each axis that may be made of how a receiver of these times filters its swing, 0 to 1.
+
+    Of a tone of the rate w with a quick part ``e w`` a receiver leaves out ``e w x d``, with a d of its own for each tone. The
+    states have one d for all: an arm comes out wrong by up to ``E[q w] / E[w^2]`` of d. That is some hundredths of a long swell,
+    nearly all of rough ground. An arm along an axis is shown by the rates about the two others.
+    """
+    now, quick = _quick(record, time)
+    (x, y, z), (a, b, c) = np.mean(now**2, axis=0), np.mean(now * quick, axis=0)
+    swing, part = np.array([y + z, x + z, x + y]), np.array([b + c, a + c, a + b])
+    return np.where(swing > 0.0, np.clip(part / np.where(swing > 0.0, swing, 1.0), 0.0, 1.0), 1.0)
+
+
 def unseen_sigma(arm: Array, askew: float) -> Array:
     """(9,) m: sigmas of D by rows: of ``q x d``, d as long as the arm, and of ``M q x l``, elements of M of `askew`, 1."""
     of_axes = askew * np.hypot(arm[[1, 2, 0]], arm[[2, 0, 1]])
@@ -130,11 +143,8 @@ def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late
     late = late and is_swung_late(source)
     if estimated is None and not (known or late):
         return source
-    half = _filters(source.time)
-    middle, rates, means = _rates(record, half)
-    now = _at(middle, rates, source.time)
-    # Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
-    quick = now - _means(record, means, source.time, half)
+    _, quick = _quick(record, source.time)
+    middle = record.time - 0.5 * record.steps
     slow, change = (_at(middle, of, source.time) if late else np.zeros_like(quick) for of in slow_rates(record))
     shown = replace(source, kind=SMOOTHED_VELOCITY, measured=np.hstack([source.measured, quick, slow, change]))
     if estimated is None:
@@ -149,6 +159,17 @@ def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late
 def is_swung_late(source: Aiding) -> bool:
     """Whether a source has a delay that is estimated, and an arm on which it swings."""
     return "lag" in source.states and (bool(source.lever_arm.any()) or "lever arm" in source.states)
+
+
+def _quick(record: ImuRecord, time: Array) -> tuple[Array, Array]:
+    """(M, 3) rates at a receiver's times, and what is quick of them, rad/s.
+
+    Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
+    """
+    half = _filters(time)
+    middle, rates, means = _rates(record, half)
+    now = _at(middle, rates, time)
+    return now, now - _means(record, means, time, half)
 
 
 def _at(middle: Array, values: Array, time: Array) -> Array:
