@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 
 from benchmarks.honesty.circling import compared, drawn_start
-from benchmarks.honesty.masts import DOUBTED
+from benchmarks.honesty.driving import car
+from benchmarks.honesty.masts import DOUBTED, received, shaken
 from benchmarks.honesty.masts import carried as on_a_mast
 from tests.alignment.test_in_motion_moments import recorded
 from truenorth.aiding.aids import Gnss
 from truenorth.errors.deflection import Deflection
 from truenorth.navigation import Mounting, navigate
-from truenorth.quality.swing import UNSEEN_ARM, quick_part, slow_rates, with_unseen_arm
+from truenorth.quality.swing import UNSEEN_ARM, meant_part, quick_part, slow_rates, with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
+from truenorth.simulation import ideal_log, simulate
 
 
 def carried(grade, seed, arm, mean, said, late=0.0, rate=1.0):
@@ -85,6 +87,33 @@ def test_how_much_of_an_arm_is_made_of_how_a_receiver_filters():
     np.testing.assert_allclose(part((0.1, 9.3), (0.1, 3.3), (0.0, 1.0)), [short, swell, (swell + short) / 2], rtol=0.03)
     assert part((0.1, 0.43), (0.1, 0.37), (0.0, 1.0))[2] > 0.8
     assert (part((0.0, 1.0), (0.0, 1.0), (0.0, 1.0)) == 1.0).all()
+
+
+def test_how_much_shorter_an_arm_seems_to_means():
+    """A mean over T leaves ``sinc(f T)`` of a tone."""
+    time = 0.01 * np.arange(1, 30001)
+    for every, period in ((0.1, 0.35), (0.1, 0.7), (1.0, 6.0), (1.0, 9.0)):
+        gyro = np.zeros((len(time), 3))
+        gyro[:, 0] = 0.1 * np.sin(2.0 * np.pi * (time - 0.005) / period)
+        record = ImuRecord(time, 0.01 * gyro, np.zeros_like(gyro), "increments", "a tone")
+        found = meant_part(record, np.arange(20.0, 280.0, every))
+        np.testing.assert_allclose(found[1:], 1.0 - np.sinc(every / period), rtol=0.05)
+
+
+def test_an_arm_that_is_said_right_is_not_doubted_for_means_of_quick_tones():
+    """Means over .1 s of a car's roll of .4 s: the arm of 2 m seemed .2 m shorter, 9 sigmas, and no part of its swing unseen."""
+    rng, spec = np.random.default_rng([9100, 8, 77]), imu_spec("consumer")
+    duration = float(rng.uniform(150.0, 260.0))
+    motion = shaken(car(rng, duration), rng)
+    arm = np.array([rng.uniform(-0.6, 0.6), rng.uniform(-1.2, 1.2), rng.uniform(0.8, 2.4)])
+    sim = simulate(ideal_log(motion, rate=100.0, duration=duration), imu=spec, seed=9100, run=8)
+    start = drawn_start(motion, spec, rng)
+    aid = Gnss(received(motion, duration, 0.1, 0.1, arm, rng), Mounting(lever_arm=arm, latency_sigma=0.2))
+    result = navigate(sim.record, start, aid=aid, imu=spec, deflection=Deflection(0.0))
+    found = compared(result, motion, tuple(duration * part for part in (0.25, 0.5, 0.75, 1.0)))
+    assert result.status == "navigated"
+    assert not any(item.key == "second_look.arm" for item in result.evidence)
+    assert max(np.abs(ratio).max() for ratio in found.ratios.values()) < 4.0
 
 
 def test_slow_rates_have_a_swell_and_nothing_of_rough_ground():

@@ -21,7 +21,7 @@ from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
 from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
 from truenorth.navigation.result import Altitude
-from truenorth.navigation.second_look import SENSORS, as_found
+from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
@@ -29,6 +29,7 @@ from truenorth.quality.stamps import with_scatter
 from truenorth.quality.swing import (
     UNSEEN_ARM,
     is_swung_late,
+    meant_part,
     quick_part,
     shown_arm,
     swing,
@@ -138,7 +139,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
         track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES), fixes)
-        track = with_open_arm(track, quick_swing(plan, given))
+        track = with_open_arm(track, quick_swing(plan, given)[0])
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
         if receiver.mounting is not None:
@@ -184,9 +185,11 @@ def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: b
 
 
 def quick_swing(plan: Plan, given: Mapping[str, Aid]) -> Array:
-    """(3,) part of an antenna's arm that is shown by what its receiver may filter; all of it where there are no velocities."""
+    """(2, 3) parts of an antenna's arm: shown by what its receiver may filter, all where there are no velocities; lost in means."""
     times = [source.time for source in plan.sources(given) if source.name == SPEEDS]
-    return quick_part(plan.record, times[0]) if times and len(times[0]) else np.ones(3)
+    if not times or not len(times[0]):
+        return ALL_QUICK
+    return np.stack([quick_part(plan.record, times[0]), meant_part(plan.record, times[0])])
 
 
 def lost(track: Track) -> bool:

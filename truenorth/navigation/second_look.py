@@ -29,7 +29,7 @@ KNOWN_ARM = 0.2  # of an arm, the sigma up to which the data show it
 SMALLER = {"centimetres": 1e-2, "millimetres": 1e-3}
 AXES = ("right", "forward", "up")
 LEAST_ANTENNA = 0.1  # m, of an antenna's arm, worth a word: places are known to as much
-ALL_QUICK = np.ones(3)
+ALL_QUICK = np.array([[1.0] * 3, [0.0] * 3])
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,8 @@ def second_look(
         With the sensors mounted as they are said to be.
     mounting : mapping
         How they are said to sit, by the sensor's name.
-    quick : (3,) array
-        Part of the antenna's swing that a receiver may filter (:func:`truenorth.quality.swing.quick_part`).
+    quick : (2, 3) array
+        Parts of the antenna's arm that a receiver may filter (:func:`truenorth.quality.swing.quick_part`, `meant_part`).
     """
     if track is None:
         return []
@@ -106,7 +106,7 @@ def second_look(
             value, sigma = track.sensors[-1, where], np.hypot(track.sigma[-1, where], said)
             least = OPEN[role].least
             if role == "lever arm" and key == "gnss":
-                sigma, least = np.hypot(_arm_sigma(track, quick), said), LEAST_ANTENNA
+                sigma, least = np.hypot(_arm_sigma(track, given, quick), said), LEAST_ANTENNA
             size = np.where(np.abs(value) > least, np.abs(value) / sigma, 0.0)
             if np.any(size > limit("misfit")):
                 item = _contradiction(role, name, key, given, value, sigma)
@@ -131,16 +131,20 @@ def wrong_antenna(track: Track | None, given: Mounting, quick: Array) -> Evidenc
     where = None if track is None else track.layout.slice_of(ANTENNA_ARM)
     if track is None or where is None:
         return None
-    value, sigma = track.sensors[-1, where], _arm_sigma(track, quick)
+    value, sigma = track.sensors[-1, where], _arm_sigma(track, given, quick)
     if not np.any((np.abs(value) > LEAST_ANTENNA) & (np.abs(value) > limit("misfit") * sigma)):
         return None
     return _contradiction("lever arm", SENSORS["gnss"][0], "gnss", given, value, sigma)
 
 
-def _arm_sigma(track: Track, quick: Array) -> Array:
-    """(3,) m, of an antenna's arm: what is quick of the swing, its receiver filters as nobody knows, up to that either way."""
+def _arm_sigma(track: Track, given: Mounting, quick: Array) -> Array:
+    """(3,) m, of an antenna's arm: what is quick of the swing, its receiver filters as nobody knows, up to that either way.
+
+    It may take means, whatever part of the swing seems to be left out: to those the arm that was said is shorter.
+    """
     where = track.layout.slice_of(ANTENNA_ARM)
-    return np.asarray(np.hypot(track.sigma[-1, where], quick * unseen_arm(track)[0] / math.sqrt(3.0)))
+    filters = np.maximum(quick[0] * np.abs(unseen_arm(track)[0]), quick[1] * np.abs(given.lever_arm)) / math.sqrt(3.0)
+    return np.asarray(np.hypot(track.sigma[-1, where], filters))
 
 
 def _contradicted(track: Track) -> float:
