@@ -107,7 +107,7 @@ def meant_part(record: ImuRecord, time: Array) -> Array:
     """(3,) part of an arm along each axis by which it seems shorter to means over a receiver's interval, 0 to 1.
 
     A mean over T leaves ``sinc(f T)`` of a tone: nothing is missing of a swell at 10 Hz, an eighth of one of .35 s. Of a rate whose
-    tones are as quick as each other it cannot be told from an arm that is shorter: no part of the swing seems to be left out then.
+    tones are as quick as each other it looks like an arm that is shorter: no part of the swing seems to be left out then.
     """
     half = 0.5 * _filters(time)
     middle, rates, _ = _rates(record, 2.0 * half)
