@@ -143,7 +143,8 @@ def _arm_sigma(track: Track, given: Mounting, quick: Array) -> Array:
     It may take means, whatever part of the swing seems to be left out: to those the arm that was said is shorter.
     """
     where = track.layout.slice_of(ANTENNA_ARM)
-    filters = np.maximum(quick[0] * np.abs(unseen_arm(track)[0]), quick[1] * np.abs(given.lever_arm)) / math.sqrt(3.0)
+    shorter = np.maximum(-np.sign(track.sensors[-1, where]) * given.lever_arm, 0.0)
+    filters = np.maximum(quick[0] * np.abs(unseen_arm(track)[0]), quick[1] * shorter) / math.sqrt(3.0)
     return np.asarray(np.hypot(track.sigma[-1, where], filters))
 
 
