@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 Said = Literal["said", "not said", "said wrong"]
 GRADES = ("consumer", "industrial", "tactical")
 PLACE, SPEED = 0.5, 0.03  # m, m/s: white noise of a receiver
+DOUBTED = "arm doubted"
 MEANS = 20  # moments that a mean is taken of
 
 
@@ -85,6 +86,7 @@ def carried(vehicle: str, means: bool, said: Said, longest: float = 600.0, **opt
         result = navigate(sim.record, start, aid=Gnss(record, mounting), imu=spec, deflection=STRAIGHT, **options)
         found = compared(result, motion, tuple(duration * part for part in (0.25, 0.5, 0.75, 1.0)))
         about = f"{grade}, {duration:.0f} s, {1.0 / every:g} Hz, arm {arm.round(1)} m, {found.said}"
+        about += f", {DOUBTED}" * any(item.key == "second_look.arm" for item in result.evidence)
         return Outcome(found.ratios, found.refused, about)
 
     return run

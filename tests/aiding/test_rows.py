@@ -45,7 +45,7 @@ def _aiding(kind):
     measured = {
         "position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0],
         "heading": [0.3],
-        "smoothed velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6],
+        "smoothed velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6, 0.3, -0.2, 0.4, 0.8, -0.5, 0.7],
     }.get(kind, [1.0, 2.0, 3.0])
     C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
     figures = {"magnetic field": (0.05, 0.4, -0.9), "odometer": COUNTED_FORWARD, DRIFTING: (1.0,)}.get(kind, ())
@@ -163,6 +163,31 @@ def test_a_late_body_velocity_is_that_of_the_earlier_axes(w):
     counted, change = row(C, v_b, lag, 0.0)  # of a wheel: that it does not slide holds at every moment
     np.testing.assert_allclose(counted, [row(C, v_b, 0.0)[0][0], late[1], row(C, v_b, 0.0)[0][2]], atol=1e-12)
     np.testing.assert_allclose(change, [0.0, 1.02 * (C_mb @ push)[1], 0.0], atol=1e-12)
+
+
+def test_a_late_antenna_is_shown_with_the_swing_of_the_earlier_moment():
+    """By finite differences of ``v + C (w x l)`` along a motion; without the swing's change the row is off by .1 m/s."""
+    from scipy.spatial.transform import Rotation
+
+    from truenorth.aiding.velocity import velocity_row
+
+    w, spin, push, arm, lag = (
+        np.array(a) for a in ([0.3, -0.2, 0.1], [0.2, 0.4, -0.1], [0.5, -0.2, 0.1], [1.0, -2.0, 7.0], 1e-3)
+    )
+    C, v, nothing = dcm_from_euler(0.4, 0.1, -0.2), np.array([3.0, -2.0, 0.5]), (0.0, 0.0, 0.0)
+
+    def row(lag, v=v, C=C, w=w):
+        s = wander.state_at(C, v, LAT, LON, ALT)
+        H, z = np.zeros((3, 32)), np.zeros(3)
+        velocity_row(s, C, *map(tuple, (w, push, arm)), nothing, tuple(w), tuple(spin), lag, -1, 31, np.zeros(3), H, z)
+        return z, H[:, 31]
+
+    late, change = row(lag)
+    before = Rotation.from_rotvec(-lag * (w - 0.5 * lag * spin))
+    np.testing.assert_allclose(late, row(0.0, v - lag * push, C @ before.as_matrix(), w - lag * spin)[0], atol=1e-5)
+    grown = np.cross(spin, arm) + np.cross(w, np.cross(w, arm))
+    assert np.linalg.norm(grown) > 1.0
+    np.testing.assert_allclose(change, push + C @ grown, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["velocity", "smoothed velocity", "body velocity", "odometer"])

@@ -140,7 +140,8 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     away = (-r[0], -r[1], -r[2])
     lag = lag_now(now, assumed, at[AT_LAG]) + state_of(assumed, at[AT_FILTER])
     lag -= 0.0 if np.isnan(measured[43]) else measured[43]
-    velocity_row(now, C, w_eb, push, away, (0.0, 0.0, 0.0), lag, -1, at[AT_LAG], measured, H, z)
+    nothing = (0.0, 0.0, 0.0)
+    velocity_row(now, C, w_eb, push, away, nothing, nothing, nothing, lag, -1, at[AT_LAG], measured, H, z)
     if at[AT_ARM] >= 0:
         turn = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
         seen = beyond_noise(turn, figures[OWN])

@@ -21,12 +21,21 @@ from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
 from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
 from truenorth.navigation.result import Altitude
-from truenorth.navigation.second_look import SENSORS, as_found
+from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
 from truenorth.quality.stamps import with_scatter
-from truenorth.quality.swing import UNSEEN_ARM, shown_arm, swing, unseen_swing, with_unseen_arm
+from truenorth.quality.swing import (
+    UNSEEN_ARM,
+    is_swung_late,
+    meant_part,
+    quick_part,
+    shown_arm,
+    swing,
+    unseen_swing,
+    with_unseen_arm,
+)
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -59,6 +68,7 @@ class Plan:
     slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
     factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
     swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
+    late: bool = False  # what the receiver shows late is its antenna's slow swing, too
     unseen: float = 0.0  # share of that swing which is in their noise
     scattered: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
 
@@ -69,7 +79,7 @@ class Plan:
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
-        used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings), *self.always]
+        used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late), *self.always]
         return navigate_track(
             self.record,
             self.start,
@@ -91,6 +101,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     said: list[Evidence] = []
     asked = given
     track = plan.run(plan.sources(given), smooth=smooth)
+    plan, track = _with_late_swing(plan, given, track, smooth)
     plan, track = _with_swing_apart(plan, given, track, smooth)
     plan, track = _not_lost(plan, given, track, smooth)
     plan, track = _as_noisy(plan, given, track, smooth)
@@ -128,7 +139,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
         track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES), fixes)
-        track = with_open_arm(track)
+        track = with_open_arm(track, quick_swing(plan, given)[0])
         if receiver.mounting is not None and receiver.mounting.velocities is not None:
             said += delay_notes(delays_found(track, {SENSORS[Gnss.key][0]: receiver.mounting}))
         if receiver.mounting is not None:
@@ -138,6 +149,22 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
             continue
         track = counted_between(track, name, given[key].mounting, asked[key].mounting)
     return plan, given, track, said
+
+
+def _with_late_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
+    """The plan whose receiver shows its antenna's slow swing as late as all else, where the log speaks for it; else the same ones.
+
+    First of all: a ship hardly pushes, and of a swell on a mast that no delay explains the filter loses its track. On rough ground
+    alone what little a slow part has of the quick swing looks like a delay, many times that of the receiver.
+    """
+    later = replace(plan, late=True)
+    if not any(source.name == SPEEDS and is_swung_late(source) for source in plan.sources(given)):
+        return plan, track
+    try:
+        other = later.run(later.sources(given), smooth=smooth)
+    except DataError:  # the filter broke down
+        return plan, track
+    return (later, other) if explained_by_two(other, track) else (plan, track)
 
 
 def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
@@ -157,7 +184,15 @@ def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: b
     return (apart, other) if explained_by_two(other, track) else (plan, track)
 
 
-def _lost(track: Track) -> bool:
+def quick_swing(plan: Plan, given: Mapping[str, Aid]) -> Array:
+    """(2, 3) parts of an antenna's arm: shown by what its receiver may filter, all where there are no velocities; lost in means."""
+    times = [source.time for source in plan.sources(given) if source.name == SPEEDS]
+    if not times or not len(times[0]):
+        return ALL_QUICK
+    return np.stack([quick_part(plan.record, times[0]), meant_part(plan.record, times[0])])
+
+
+def lost(track: Track) -> bool:
     """Whether the gates of a track keep out more of a sensor's rows than chance and some jumps do."""
     return max((r.rejected / max(len(r.time), 1) for r in track.residuals), default=0.0) > limit("rejected")
 
@@ -170,7 +205,7 @@ def _not_lost(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> 
     """
     receiver = given.get(Gnss.key)
     if (
-        not _lost(track)
+        not lost(track)
         or not isinstance(receiver, Gnss)
         or not (antenna := receiver.mounting)
         or antenna.latency_sigma == 0.0
@@ -204,7 +239,7 @@ def _all_shown(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) ->
         quiet = shown.run(shown.sources(later), smooth=smooth)
     except DataError:  # the filter broke down
         return plan, given, track
-    return (plan, given, track) if _lost(quiet) or explained_by_two(track, quiet) else (shown, later, quiet)
+    return (plan, given, track) if lost(quiet) or explained_by_two(track, quiet) else (shown, later, quiet)
 
 
 def _with_unseen_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:

@@ -29,6 +29,7 @@ from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
+from truenorth.navigation.arm import filtered_by_possible_arm, looser_track
 from truenorth.navigation.by_start import start_evidence
 from truenorth.navigation.given import (
     arm_as_begun,
@@ -43,7 +44,7 @@ from truenorth.navigation.given import (
     said_of,
     taken_over,
 )
-from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
+from truenorth.navigation.passes import COARSE, Plan, delayed, filtered, quick_swing
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
 from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
@@ -217,12 +218,15 @@ def _by_specification(
         plan = replace(plan, always=[*zero_updates(record, zupt, *logs_of_speed(given)), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
-    plan, used, track, wanders = filtered(plan, given, smooth)
+    done, loose = (
+        filtered_by_possible_arm(plan, given, smooth) if check_clocks else (filtered(plan, given, smooth), None)
+    )
+    plan, used, track, wanders = done
     evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said]
     least = None
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
-        seen, least = _rivals(plan, track, used, noise, modelled, smooth)
+        seen, least = _rivals(plan, track, used, noise, modelled, smooth, loose)
         evidence += seen
     else:
         evidence += burst_evidence(record)
@@ -294,6 +298,7 @@ def _rivals(
     spec: ImuSpec,
     modelled: Callable[[ImuSpec], InsModel],
     smooth: bool,
+    loose: Track | None,
 ) -> tuple[list[Evidence], Array]:
     """What other biases, a poorer IMU, other clocks and mountings explain better; growth by poorer IMUs and other starts."""
     aiding = plan.sources(given)
@@ -323,7 +328,8 @@ def _rivals(
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     found += _led_away(plan, track, given, smooth)
     found += _gyros_of_another_moment(plan, given)
-    found += second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
+    loose = looser_track(plan, given) if loose is None else loose
+    found += second_look(loose, track, looked_at(given), quick_swing(plan, given))
     unsure, growth = start_evidence(of_start, plan.start, track)
     return found + unsure, np.maximum(growth_along(track, others), growth)
 

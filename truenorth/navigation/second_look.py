@@ -17,6 +17,7 @@ from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.rivals import moved
 from truenorth.quality.swing import unseen_arm
 from truenorth.state.evidence import Effect, Evidence, Figure, note
+from truenorth.state.layout import ANTENNA_ARM
 from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
@@ -27,6 +28,8 @@ LONG_ARM = 10.0  # m: longer than on most vehicles, worth a word where the data 
 KNOWN_ARM = 0.2  # of an arm, the sigma up to which the data show it
 SMALLER = {"centimetres": 1e-2, "millimetres": 1e-3}
 AXES = ("right", "forward", "up")
+LEAST_ANTENNA = 0.1  # m, of an antenna's arm, worth a word: places are known to as much
+ALL_QUICK = np.array([[1.0] * 3, [0.0] * 3])
 
 
 @dataclass(frozen=True)
@@ -52,8 +55,25 @@ SENSORS: dict[str, tuple[str, tuple[Role, ...]]] = {
 }
 
 
+def looser(run: Callable[[Mapping[str, Mounting]], Track], mounting: Mapping[str, Mounting]) -> Track | None:
+    """The track with clocks, arms, scales and mountings left open; None: no figure of it is worth a thing.
+
+    Parameters
+    ----------
+    run : callable
+        Navigates with the sensors so mounted.
+    mounting : mapping
+        How they are said to sit, by the sensor's name.
+    """
+    try:
+        track = run({name: _loosened(name, m) for name, m in mounting.items()})
+    except DataError:  # the measurements fit no track at all, which the first pass has shown
+        return None
+    return None if _contradicted(track) > limit("rejected") else track  # a model that does not hold
+
+
 def second_look(
-    run: Callable[[Mapping[str, Mounting]], Track], first: Track, mounting: Mapping[str, Mounting]
+    track: Track | None, first: Track, mounting: Mapping[str, Mounting], quick: Array = ALL_QUICK
 ) -> list[Evidence]:
     """What the data contradict of clocks, arms, scales and mountings, and long arms that they do not show.
 
@@ -61,18 +81,16 @@ def second_look(
 
     Parameters
     ----------
-    run : callable
-        Navigates with the sensors so mounted.
+    track : Track or None
+        With all of them left open (:func:`looser`).
     first : Track
         With the sensors mounted as they are said to be.
     mounting : mapping
         How they are said to sit, by the sensor's name.
+    quick : (2, 3) array
+        Parts of the antenna's arm that a receiver may filter (:func:`truenorth.quality.swing.quick_part`, `meant_part`).
     """
-    try:
-        track = run({name: _loosened(name, m) for name, m in mounting.items()})
-    except DataError:  # the measurements fit no track at all, which the first pass has shown
-        return []
-    if _contradicted(track) > limit("rejected"):  # figures of a model that does not hold are worth nothing
+    if track is None:
         return []
     against, found = [], []
     for key, (name, roles) in SENSORS.items():
@@ -86,9 +104,10 @@ def second_look(
             if where is None or (said > 0.0 and role != "lever arm"):
                 continue
             value, sigma = track.sensors[-1, where], np.hypot(track.sigma[-1, where], said)
+            least = OPEN[role].least
             if role == "lever arm" and key == "gnss":
-                sigma = np.hypot(sigma, unseen_arm(track)[0])  # how its receiver filters nobody knows
-            size = np.where(np.abs(value) > OPEN[role].least, np.abs(value) / sigma, 0.0)
+                sigma, least = np.hypot(_arm_sigma(track, given, quick), said), LEAST_ANTENNA
+            size = np.where(np.abs(value) > least, np.abs(value) / sigma, 0.0)
             if np.any(size > limit("misfit")):
                 item = _contradiction(role, name, key, given, value, sigma)
                 against.append(replace(item, urgent=bool(np.any(size > limit("clear misfit")))))
@@ -102,6 +121,31 @@ def second_look(
     whole = moved(first, track)
     share = Effect(*(size / math.sqrt(len(against)) for _, size in whole.items()))
     return [replace(item, kind="known" if item.urgent else "hint", effect=share) for item in against] + found
+
+
+def wrong_antenna(track: Track | None, given: Mounting, quick: Array) -> Evidence | None:
+    """That an antenna cannot sit where it is said to, as a track with its arm left open shows; None where it can.
+
+    The text says where it seems to be. There is no effect: that is of a track whose arm is estimated.
+    """
+    where = None if track is None else track.layout.slice_of(ANTENNA_ARM)
+    if track is None or where is None:
+        return None
+    value, sigma = track.sensors[-1, where], _arm_sigma(track, given, quick)
+    if not np.any((np.abs(value) > LEAST_ANTENNA) & (np.abs(value) > limit("misfit") * sigma)):
+        return None
+    return _contradiction("lever arm", SENSORS["gnss"][0], "gnss", given, value, sigma)
+
+
+def _arm_sigma(track: Track, given: Mounting, quick: Array) -> Array:
+    """(3,) m, of an antenna's arm: what is quick of the swing, its receiver filters as nobody knows, up to that either way.
+
+    It may take means, whatever part of the swing seems to be left out: to those the arm that was said is shorter.
+    """
+    where = track.layout.slice_of(ANTENNA_ARM)
+    shorter = np.maximum(-np.sign(track.sensors[-1, where]) * given.lever_arm, 0.0)
+    filters = np.maximum(quick[0] * np.abs(unseen_arm(track)[0]), quick[1] * shorter) / math.sqrt(3.0)
+    return np.asarray(np.hypot(track.sigma[-1, where], filters))
 
 
 def _contradicted(track: Track) -> float:

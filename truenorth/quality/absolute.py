@@ -153,16 +153,17 @@ def _with_arm_of(track: Track, start: Start) -> Track:
     return _wider(track, np.maximum(begun - now, 0.0))
 
 
-def with_open_arm(track: Track) -> Track:
+def with_open_arm(track: Track, quick: Array) -> Track:
     """The track with the place as uncertain as is the part of an estimated arm whose swing the receiver does not show.
 
     What is learnt of the arm upward is made of how the receiver filters then, which is another thing for each tone of a swing.
-    The square of that part as found, less its variance: of a receiver that shows all there is nothing left.
+    The square of that part as found, less its variance: of a receiver that shows all there is nothing left. Of a swell hardly a
+    part is made of how it filters, `quick` (:func:`truenorth.quality.swing.quick_part`).
     """
     if track.layout.slice_of(ANTENNA_ARM) is None or not len(track.P):
         return track
     d, sigma = unseen_arm(track)
-    return _wider(track, np.tile(np.maximum(d**2 - sigma**2, 0.0), (len(track), 1)))
+    return _wider(track, np.tile(quick**2 * np.maximum(d**2 - sigma**2, 0.0), (len(track), 1)))
 
 
 def _wider(track: Track, variance: Array) -> Track:

@@ -93,6 +93,35 @@ def unseen_arm(track: Track) -> tuple[Array, Array]:
     return d, 1.0 / np.sqrt(total)
 
 
+def quick_part(record: ImuRecord, time: Array) -> Array:
+    """(3,) part of an arm along each axis that may be made of how a receiver of these times filters its swing, 0 to 1.
+
+    Of a tone of the rate w with a quick part ``e w`` a receiver leaves out ``e w x d``, with a d of its own for each tone. The
+    states have one d for all: an arm comes out wrong by up to ``E[q w] / E[w^2]`` of d. That is some hundredths of a long swell,
+    nearly all of rough ground. An arm along an axis is shown by the rates about the two others.
+    """
+    return _part(*_quick(record, time))
+
+
+def meant_part(record: ImuRecord, time: Array) -> Array:
+    """(3,) part of an arm along each axis by which it seems shorter to means over a receiver's interval, 0 to 1.
+
+    A mean over T leaves ``sinc(f T)`` of a tone: nothing is missing of a swell at 10 Hz, an eighth of one of .35 s. Of a rate whose
+    tones are as quick as each other it looks like an arm that is shorter: no part of the swing seems to be left out then.
+    """
+    half = 0.5 * _filters(time)
+    middle, rates, _ = _rates(record, 2.0 * half)
+    now = _at(middle, rates, time)
+    return _part(now, now - _means(record, rates, time, half))
+
+
+def _part(now: Array, left: Array) -> Array:
+    """(3,) part of an arm along each axis that is shown by what is `left` out of rates, 0 to 1."""
+    (x, y, z), (a, b, c) = np.mean(now**2, axis=0), np.mean(now * left, axis=0)
+    swing, part = np.array([y + z, x + z, x + y]), np.array([b + c, a + c, a + b])
+    return np.where(swing > 0.0, np.clip(part / np.where(swing > 0.0, swing, 1.0), 0.0, 1.0), 1.0)
+
+
 def unseen_sigma(arm: Array, askew: float) -> Array:
     """(9,) m: sigmas of D by rows: of ``q x d``, d as long as the arm, and of ``M q x l``, elements of M of `askew`, 1."""
     of_axes = askew * np.hypot(arm[[1, 2, 0]], arm[[2, 0, 1]])
@@ -112,32 +141,56 @@ def swing(track: Track, record: ImuRecord, arm: Array, time: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(np.einsum("kia,kab,kib->ki", C, covariance, C), 0.0)))
 
 
-def with_unseen_arm(aiding: Iterable[Aiding], record: ImuRecord, askew: float, *, known: bool = False) -> list[Aiding]:
+def with_unseen_arm(
+    aiding: Iterable[Aiding], record: ImuRecord, askew: float, *, known: bool = False, late: bool = False
+) -> list[Aiding]:
     """The same sources; a receiver's velocities with the part of an estimated arm whose swing they do not show, among their states.
 
     It is as long as the arm may be, along each axis; `askew`, scale factors and misalignments of the gyros, adds to it. With
-    `known`, of an arm that is known as well, where its swing is large enough to be seen in a row's noise.
+    `known`, of an arm that is known as well, where its swing is large enough to be seen in a row's noise. With `late`, a delay that
+    is estimated shows the slow swing of an earlier moment.
     """
-    return [_smoothed(s, record, askew, known) if s.name == VELOCITIES else s for s in aiding]
+    return [_smoothed(s, record, askew, known, late) if s.name == VELOCITIES else s for s in aiding]
 
 
-def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool) -> Aiding:
+def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late: bool) -> Aiding:
     estimated = source.states.get("lever arm")
-    if estimated is None and not (known and source.lever_arm.any()):
+    known = known and bool(source.lever_arm.any())
+    late = late and is_swung_late(source)
+    if estimated is None and not (known or late):
         return source
-    half = _filters(source.time)
-    middle, rates, means = _rates(record, half)
-    now = np.stack([np.interp(source.time, middle, rate) for rate in rates.T], axis=1)
-    # Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
-    quick = now - _means(record, means, source.time, half)
+    _, quick = _quick(record, source.time)
+    middle = record.time - 0.5 * record.steps
+    slow, change = (_at(middle, of, source.time) if late else np.zeros_like(quick) for of in slow_rates(record))
+    shown = replace(source, kind=SMOOTHED_VELOCITY, measured=np.hstack([source.measured, quick, slow, change]))
     if estimated is None:
         swings = np.linalg.norm(np.cross(quick, source.lever_arm), axis=1)
-        if math.sqrt(float(np.mean(swings**2))) < SEEN * float(np.nanmedian(source.sigma)):
-            return source
+        if not known or math.sqrt(float(np.mean(swings**2))) < SEEN * float(np.nanmedian(source.sigma)):
+            return shown if late else source
     arm = np.hypot(source.lever_arm, 0.0 if estimated is None else estimated.sigma)
     unseen = Group(UNSEEN_ARM, unseen_sigma(arm, askew), unit="m")
-    measured = np.hstack([source.measured, quick])
-    return replace(source, kind=SMOOTHED_VELOCITY, measured=measured, states={**source.states, "filter": unseen})
+    return replace(shown, states={**source.states, "filter": unseen})
+
+
+def is_swung_late(source: Aiding) -> bool:
+    """Whether a source has a delay that is estimated, and an arm on which it swings."""
+    return "lag" in source.states and (bool(source.lever_arm.any()) or "lever arm" in source.states)
+
+
+def _quick(record: ImuRecord, time: Array) -> tuple[Array, Array]:
+    """(M, 3) rates at a receiver's times, and what is quick of them, rad/s.
+
+    Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
+    """
+    half = _filters(time)
+    middle, rates, means = _rates(record, half)
+    now = _at(middle, rates, time)
+    return now, now - _means(record, means, time, half)
+
+
+def _at(middle: Array, values: Array, time: Array) -> Array:
+    """(M, 3) values (N, 3) of rows' middles at some times."""
+    return np.stack([np.interp(time, middle, column) for column in values.T], axis=1)
 
 
 @remembered
@@ -145,6 +198,23 @@ def _rates(record: ImuRecord, half: float) -> tuple[Array, Array, Array]:
     """Middles of the rows (N,), s, their rates (N, 3), rad/s, and means of these over twice `half`, s: each pass asks for them."""
     rates, middle = increments(record)[0] / record.steps[:, None], record.time - 0.5 * record.steps
     return middle, rates, _means(record, rates, middle, half)
+
+
+@remembered
+def slow_rates(record: ImuRecord) -> tuple[Array, Array]:
+    """(N, 3) what is slow of the rates of the rows, rad/s, and how it changes, rad/s^2.
+
+    Four means of a second each, and those of what they have left out: of a tone of 1 s and less hardly a thousandth is left, of
+    1.5 s .06, of 3 s .7, of 6 s .97. Of quick shakes little may be left: their accelerations are tens of times those of a vehicle.
+    """
+    middle, rest, _ = _rates(record, 0.5 * SMOOTHED)
+    slow = np.zeros_like(rest)
+    for _ in range(2):
+        part = rest
+        for _ in range(4):
+            part = _means(record, part, middle, 0.5 * SMOOTHED)
+        slow, rest = slow + part, rest - part
+    return slow, np.gradient(slow, middle, axis=0) if len(middle) > 1 else np.zeros_like(slow)
 
 
 def _filters(time: Array) -> float:
