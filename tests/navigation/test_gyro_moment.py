@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import truenorth as tn
 from truenorth.aiding.aids import Gnss
-from truenorth.navigation import procedure
+from truenorth.navigation import gyro_moment
 from truenorth.simulation.scenario import read_scenario
 
 WRONG = -3.0  # s: what a state that is linear in the delay made of a crane's turns
@@ -26,8 +26,8 @@ def test_a_delay_that_spoils_the_run_is_not_taken(monkeypatch) -> None:
         held.extend([first, run(record)])
         return []
 
-    monkeypatch.setattr(procedure, "delayed", mistaken)
-    monkeypatch.setattr(procedure, "gyro_delay_evidence", against)
+    monkeypatch.setattr(gyro_moment, "delayed", mistaken)
+    monkeypatch.setattr(gyro_moment, "gyro_delay_evidence", against)
     assert tn.navigate(driven.record, start, aid=gnss).status == "navigated"
     assert len(held) == 2, "the run that fits, and what rivals are run with"
     for track in held:

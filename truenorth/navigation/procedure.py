@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
+from truenorth.aiding.aids import Aid, Gnss, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.core.errors import DataError, UsageError
@@ -26,7 +26,6 @@ from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.estimate.poorer import growth_along, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
-from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.arm import filtered_by_possible_arm, looser_track
@@ -39,14 +38,14 @@ from truenorth.navigation.given import (
     late_rows,
     logs_of_speed,
     looked_at,
-    mounted_as,
     record_of,
     said_of,
     taken_over,
 )
-from truenorth.navigation.passes import COARSE, Plan, delayed, filtered, quick_swing
+from truenorth.navigation.gyro_moment import gyros_of_another_moment
+from truenorth.navigation.passes import COARSE, Plan, filtered, quick_swing
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
-from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
+from truenorth.navigation.second_look import SENSORS, second_look
 from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
@@ -55,7 +54,7 @@ from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.held import as_sampled
-from truenorth.quality.innovations import contradicted, innovation_evidence
+from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
@@ -77,7 +76,6 @@ Array = NDArray[np.float64]
 LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
 FINE = 0.2
 DAMPED = 8.0  # s: rows of a track that damping goes on from are no farther apart
-MOMENT = 1800.0  # s of a log, that show whether gyros and accelerometers are of one moment
 PLUMB_LINE = Deflection()
 
 
@@ -327,7 +325,7 @@ def _rivals(
     found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without, of_another_course)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     found += _led_away(plan, track, given, smooth)
-    found += _gyros_of_another_moment(plan, given)
+    found += gyros_of_another_moment(plan, given)
     loose = looser_track(plan, given) if loose is None else loose
     found += second_look(loose, track, looked_at(given), quick_swing(plan, given))
     unsure, growth = start_evidence(of_start, plan.start, track)
@@ -347,35 +345,6 @@ def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) 
     usual, without = partial(with_log, plan.slow), [partial(with_log, less) for less in one_less(plan.slow)]
     found = led_by_evidence(usual, track, receiver.record, without)
     return found if plan.altitude == "fixed" else found + height_evidence(usual, track, receiver.record, without)
-
-
-def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evidence]:
-    """Whether gyros that are earlier or later than the accelerometers explain the measurements better, over the log's first part.
-
-    Sensors that are late look like gyros that are early: their clocks are left open first.
-    """
-    own = looked_at(given)
-    seen = {key: on_any_clock(own[key]) for key, a in given.items() if isinstance(a, Gnss | Odometer | VelocityLog)}
-    if not seen:
-        return []
-    open_ = mounted_as(given, own | seen)
-    aiding = on_springs(plan.sources(open_))
-
-    def run(record: ImuRecord) -> Track:
-        return replace(plan, record=record).run(aiding)
-
-    part = plan.record.between(None, plan.record.time[0] + MOMENT)
-    try:
-        track = run(part)
-        later = delayed(replace(plan, record=part), open_, track)
-        if later is not open_:
-            usual, whole, aiding = aiding, track, on_springs(plan.sources(later))
-            track = run(part)
-            if contradicted(track.residuals) and not contradicted(whole.residuals):  # that was no delay
-                aiding, track = usual, whole
-    except DataError:  # the filter broke down: no explanation
-        return []
-    return gyro_delay_evidence(run, track, part)
 
 
 def _intervals(
