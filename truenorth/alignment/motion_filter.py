@@ -17,8 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.motion_fit import CLOSE, search, with_guess
-from truenorth.alignment.motion_joint import JointLikelihood, fit_jointly
+from truenorth.alignment.motion_fit import search, with_guess
 from truenorth.alignment.motion_likelihood import Series, Walks
 from truenorth.alignment.swing_fit import fit_swing
 from truenorth.errors.staying import PHI, QUIETEST_BASE
@@ -144,32 +143,6 @@ class SwingFilter(MotionFilter):
             self.motion = _no_quieter(
                 fit_swing(system, self.interval, self.walks, self.motion, system.H[:, :, self.turns])
             )
-        return self.filtered()
-
-
-class JointFilter(MotionFilter):
-    """The same about an answer of another, with the motions along all axes fitted at once (:mod:`.motion_joint`)."""
-
-    score = math.inf  # Schwarz's criterion of the last fit
-
-    def __init__(self, plain: MotionFilter) -> None:
-        self.interval, self.walks, self.motion, self.fit, self.passes = (
-            plain.interval,
-            plain.walks,
-            plain.motion,
-            plain.fit,
-            0,
-        )
-
-    def __call__(self, system: LinearSystem) -> Filtered:
-        """A pass; the motions are fitted until that makes the log no likelier."""
-        self.passes, self.base = self.passes + 1, system
-        if self.passes == 1 or self.stale:
-            likelihood = JointLikelihood(system, self.interval, self.walks)
-            fits = [fit_jointly(likelihood, guess) for guess in (self.motion, self.fit(system.z))]
-            motion, score = min(fits, key=lambda fit: fit[1])
-            self.stale = self.score - score > CLOSE and self.passes < MOST_FITS
-            self.motion, self.score = _no_quieter(motion), score
         return self.filtered()
 
 

@@ -134,7 +134,7 @@ def _line_frequency(series: Series, guess: float) -> float:
     return guess
 
 
-class Scale:
+class _Scale:
     """Bounds of the logarithms about a guess; a step of a frequency is measured by the phase that it makes over the log."""
 
     def __init__(self, guess: AxisMotion, duration: float) -> None:
@@ -154,11 +154,9 @@ class Scale:
         return self.centre + self.step * u
 
     def motion(self, u: Array) -> AxisMotion:
-        """The motion at a step."""
         return motion_of(self.orders, self.logs(u))
 
     def clipped(self, u: Array) -> Array:
-        """A step within the bounds."""
         return np.minimum(np.maximum(u, self.low), self.high)
 
 
@@ -169,7 +167,7 @@ def _bounded(step: Array) -> Array:
 
 def _score(series: Series, guess: AxisMotion) -> AxisMotion:
     """Fisher scoring of the Whittle likelihood, damped as Levenberg's."""
-    scale = Scale(guess, float(series.lags[-1]))
+    scale = _Scale(guess, float(series.lags[-1]))
     size = len(scale.centre)
     u, damping = np.zeros(size), 1e-2
     unit = np.eye(size)
@@ -205,7 +203,7 @@ def _score(series: Series, guess: AxisMotion) -> AxisMotion:
 
 def climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
     """Quasi-Newton (BFGS) on the exact likelihood."""
-    scale = Scale(guess, float(series.lags[-1]))
+    scale = _Scale(guess, float(series.lags[-1]))
     size = len(scale.centre)
     around = np.vstack([np.zeros(size), DIFFERENCE * np.eye(size)])
     farther = WIDER * np.vstack([np.eye(size), -np.eye(size)])

@@ -117,7 +117,7 @@ class Series:
     def expected(self, orders: Orders, logs: Array) -> Array:
         """Expected periodograms (m, K // 2 + 1) of the tapered series, of motions with logarithms (m, 1 + 3 q) and the walks."""
         acf = np.zeros((len(logs), len(self.lags)))
-        _folded_autocovariances(orders, *values_of(logs), self.interval, self.taper, acf)
+        _folded_autocovariances(orders, *_values(logs), self.interval, self.taper, acf)
         return np.maximum(np.fft.rfft(acf).real, 1e-30) + self.walked
 
     def whittle(self, expected: Array) -> float:
@@ -128,7 +128,7 @@ class Series:
     def exact(self, orders: Orders, logs: Array) -> Array:
         """Minus twice the restricted log-likelihoods (m,) of motions with logarithms (m, 1 + 3 q)."""
         found = np.empty(len(logs))
-        _deviances(orders, *values_of(logs), self.interval, *self.walks, self.lanes, found)
+        _deviances(orders, *_values(logs), self.interval, *self.walks, self.lanes, found)
         return found
 
     def lines(self, motion: AxisMotion, frequencies: Array) -> tuple[Array, Array]:
@@ -148,7 +148,7 @@ class Series:
             pairs = np.swapaxes(np.concatenate([np.cos(phase), np.sin(phase)], axis=2), 1, 2)
             columns = np.concatenate([self.lanes, pairs], axis=1)
             grams = np.zeros((p + 2 * m, p + 2 * m, LANES))
-            weighed(orders, *values_of(logs[None]), self.interval, *self.walks, columns, grams, np.empty(LANES))
+            _products(orders, *_values(logs[None]), self.interval, *self.walks, columns, grams)
             for lane, which in enumerate(own):
                 gain[which], sigma[which] = _gained(grams[..., lane], p)
         return gain, sigma
@@ -180,7 +180,7 @@ def _gained(lower: Array, p: int) -> tuple[Array, Array]:
     return np.sum(size * match, axis=1), np.sqrt(0.5 * np.sum(size**2, axis=1))
 
 
-def values_of(logs: Array) -> tuple[Array, Array]:
+def _values(logs: Array) -> tuple[Array, Array]:
     """Variances (m,) of what is white; sigma, frequency and damping of each oscillator (m, q, 3); of logarithms (m, 1 + 3 q)."""
     values = np.exp(logs)
     return np.ascontiguousarray(values[:, 0] ** 2), np.ascontiguousarray(values[:, 1:]).reshape(len(logs), -1, 3)
@@ -201,12 +201,11 @@ def _folded_autocovariances(orders: Any, white: Any, tables: Any, interval: floa
 
 
 @compiled
-def weighed(
-    orders: Any, white: Any, tables: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, gram: Any, log_F: Any
+def _products(
+    orders: Any, white: Any, tables: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, gram: Any
 ) -> None:
-    """:func:`truenorth.filters.scalar.products` of columns Y (K, p, 8) by up to eight motions, a lane each."""
     own, behind, driven, Q, P, h, r = _models(orders, white, tables, 0, interval, walk_Phi, walk_Q)
-    products(own, behind, driven, Q, P, h, r, Y, len(h) - 2, gram, log_F)
+    products(own, behind, driven, Q, P, h, r, Y, len(h) - 2, gram, np.empty(LANES))
 
 
 @compiled

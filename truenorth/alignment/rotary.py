@@ -37,7 +37,7 @@ from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rivals import rival_evidence
 from truenorth.alignment.signatures import what_begins
-from truenorth.alignment.swaying import Mount, SwayAlignment, jointly, sway_align, swinging, usual_sway
+from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align, swinging, usual_sway
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
 from truenorth.alignment.turning import infer_turning
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
@@ -210,7 +210,7 @@ def _from_headings(start: CoarseStart, mount: Mount, spec: ImuSpec, lat: float) 
     """
     turned = _turned(spec)
     if math.sqrt(float(spec.bias_variance[:3].max())) < BLIND * EARTH_RATE * math.cos(lat):
-        return jointly(sway_align(start, mount, turned)), 0.0
+        return sway_align(start, mount, turned), 0.0
     starts = [
         start._replace(C_n0_i=dcm_from_rotation_vector([0.0, 0.0, h]) @ start.C_n0_i)
         for h in np.linspace(0.0, 2.0 * math.pi, HEADINGS, endpoint=False)
@@ -221,7 +221,7 @@ def _from_headings(start: CoarseStart, mount: Mount, spec: ImuSpec, lat: float) 
     level = [fine.misalignment_at(np.eye(3), 0.0)[0] for fine in found]
     off = [abs(float(misalignment(C, level[best])[2])) for C in level]
     unsure = max(x for x, ratio in zip(off, likely[best] - likely, strict=True) if ratio < limit("rival"))
-    return jointly(swinging(found[best], starts[best], mount, turned)), unsure
+    return swinging(found[best], starts[best], mount, turned), unsure
 
 
 def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task, *, given: bool) -> list[Evidence]:

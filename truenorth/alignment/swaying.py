@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import bias_signatures
-from truenorth.alignment.drift import drift_signatures
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.late_gyros import response_to_late_gyros
 from truenorth.alignment.matched import innovations_of, matched
-from truenorth.alignment.motion_filter import JointFilter, MotionFilter, SwingFilter
+from truenorth.alignment.motion_filter import MotionFilter, SwingFilter
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
 from truenorth.alignment.sway_noise import noisier_sensors
@@ -40,7 +39,6 @@ from truenorth.estimate.staying import Prior, StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
-from truenorth.state.limits import limit, may_be_chance
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, integrate
 
 Array = NDArray[np.float64]
@@ -180,35 +178,6 @@ def swinging(plain: SwayAlignment, start: CoarseStart, mount: Mount, turned: Imu
     swung = _filtered(on_lines, SwingFilter(plain.estimator, prior.groups["slow arm"]), plain.misfit_at)
     believed = swings(swung, swung.motion, plain, lambda: plain.begun, position) and not swung.suspect()
     return swung if believed else plain
-
-
-def jointly(plain: SwayAlignment) -> SwayAlignment:
-    """The alignment with the motions along all axes fitted at once, where something seems to begin within the log otherwise.
-
-    It is the answer where the log is likelier so by more than chance; else the one that was found without stands.
-    """
-    banks = drift_signatures(plain), bias_signatures(plain)
-    if plain.slow_arm is not None or max(
-        found.ratio.max() for found in matched(innovations_of(plain), *banks)
-    ) <= limit("hint"):
-        return plain
-    log = plain.about
-    anew = StayingLog(
-        log.record,
-        log.C_n0_i,
-        log.position,
-        log.noise,
-        log.prior,
-        log.interval,
-        log.rows,
-        integrals=log.integrals,
-        sways=log.sways,
-        C_sb=log.C_sb,
-        taken=log.taken,
-    )
-    found = _filtered(anew, JointFilter(plain.estimator), plain.misfit_at)
-    gained = 2.0 * float(found.estimates.log_likelihood - plain.estimates.log_likelihood)
-    return plain if may_be_chance(gained) else found
 
 
 def misfit_at(start: CoarseStart, mount: Mount, turned: ImuSpec | None, position: Position) -> float:
