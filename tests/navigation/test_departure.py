@@ -7,7 +7,8 @@ import pytest
 
 import truenorth as tn
 from truenorth.core.attitude import rotation_vector_from_dcm
-from truenorth.navigation.departure import leaves_at
+from truenorth.core.errors import AlignmentError
+from truenorth.navigation.departure import departure
 from truenorth.simulation import rest, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, straight, turn
@@ -51,14 +52,14 @@ def test_a_base_that_begins_to_turn_leaves():
         PLACE, [*straight(STILL), *turn(math.radians(90.0), math.radians(6.0)), *straight(20.0)], heading=HEADING
     )
     log = simulate(motion, rate=50.0, duration=60.0, imu="consumer", seed=6).record
-    assert 15.0 < leaves_at(log) <= STILL
+    assert 15.0 < departure(log).time <= STILL
 
 
 @pytest.mark.parametrize("imu", [*GRADES, "navigation"])
 def test_a_base_that_stays_does_not_leave(imu):
     for seed in range(5):
         log = simulate(rest(PLACE, HEADING, 0.02, -0.03), rate=50.0, duration=120.0, imu=imu, seed=seed).record
-        assert leaves_at(log) is None
+        assert departure(log) is None
 
 
 def test_a_buoy_is_at_rest():
@@ -73,3 +74,14 @@ def test_a_buoy_is_at_rest():
     start = tn.known_start(log, PLACE, "industrial", HEADING, SIGMA)
     assert start.time == pytest.approx(120.0, abs=1.0)
     assert (_off(start, motion) < 4.0).all()
+
+
+@pytest.mark.parametrize(("still", "acceleration"), [(1.0, 0.3), (3.0, 0.05), (5.0, 0.6)])
+def test_one_that_departs_before_it_is_seen_to_stay_is_refused(still, acceleration):
+    """Its start was taken at 10 s, with a velocity up to 41 of its sigmas off."""
+    motion = course(
+        PLACE, [*straight(still), *accelerate(12.0, acceleration, 0.0, 5.0), *straight(60.0)], heading=HEADING
+    )
+    log = simulate(motion, rate=50.0, duration=90.0, imu="tactical", seed=5).record
+    with pytest.raises(AlignmentError, match="the vehicle moves within the first"):
+        tn.known_start(log, PLACE, "tactical", HEADING, SIGMA)

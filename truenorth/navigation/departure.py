@@ -10,6 +10,9 @@ shows in the gyros in the same way.
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,8 +31,15 @@ BACK = 2.4  # times from there to where it is plain: of a push that grows, half 
 SHORTEST = 10  # s: two halves of five
 
 
-def leaves_at(record: ImuRecord) -> float | None:
-    """When a base begins to gain speed or to turn, s on the record's clock; None where it does not, or the log is below 10 s."""
+class Departure(NamedTuple):
+    """When a base begins to gain speed or to turn, and what may be wrong with a start before that."""
+
+    time: float  # s, on the record's clock: its beginning where the base is not seen to stay at all
+    unseen: float  # m/s: what speed it may have gained by then, or sways by
+
+
+def departure(record: ImuRecord) -> Departure | None:
+    """The departure of a base; None where it does not depart, or the log is below 10 s."""
     motion = motion_summary(record)
     if len(motion.time) < SHORTEST:
         return None
@@ -39,11 +49,14 @@ def leaves_at(record: ImuRecord) -> float | None:
     steady = second_means(unturned((rates[:3] - motion.rate_bias[:, None]) * interval, rates[3:]), per_second)
     views = [_level(steady), _level(second_means(rates[3:], per_second))]
     turns = second_means(rates[:3], per_second)
-    calm = SHORTEST
+    calm = 0
     for span in range(SHORTEST, len(motion.time) + 1):
         share = max(min(_share(level[:, :span], LEAST_GAIN) for level in views), _share(turns[:, :span], LEAST_TURN))
+        if share > 1.0 and not calm:
+            return Departure(float(record.time[0]), math.inf)
         if share > 1.0:
-            return float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
+            time = float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
+            return Departure(time, max(UNSEEN_GAIN, float(_gained(views[0][:, :calm]).max())))
         if share <= GONE:
             calm = span
     return None
@@ -58,6 +71,11 @@ def _level(force: Array) -> Array:
 
 def _share(rate: Array, least: float) -> float:
     """What the second half gains by a rate (3, m) beyond the first half's, as a share of what is plain."""
-    half = rate.shape[1] // 2
-    gained = np.linalg.norm(np.cumsum(rate - rate[:, :half].mean(axis=1)[:, None], axis=1), axis=0)
+    half, gained = rate.shape[1] // 2, _gained(rate)
     return float(gained[-1] / (least + WANDERS * gained[:half].max()))
+
+
+def _gained(rate: Array) -> Array:
+    """(m,) size of what a rate (3, m) gains beyond the mean of its first half, second by second."""
+    half = rate.shape[1] // 2
+    return np.asarray(np.linalg.norm(np.cumsum(rate - rate[:, :half].mean(axis=1)[:, None], axis=1), axis=0))

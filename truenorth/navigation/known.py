@@ -24,7 +24,7 @@ from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
-from truenorth.navigation.departure import UNSEEN_GAIN, leaves_at
+from truenorth.navigation.departure import UNSEEN_GAIN, Departure, departure
 from truenorth.navigation.start import moving_start, start_from_alignment
 from truenorth.quality.held import as_sampled
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
@@ -202,7 +202,7 @@ def known_start(
     if pitch is None or roll is None:
         answer, departs = _levelled(log, at, spec)
         start = start_from_alignment(with_heading(answer, heading, sigma))
-        return _may_have_left(start) if departs else start
+        return start if departs is None else _may_have_left(start, departs.unseen)
     if not (sigma > 0.0 and level_sigma > 0.0 and velocity_sigma > 0.0):
         raise UsageError(f"sigmas {sigma:g}, {level_sigma:g} rad, {velocity_sigma:g} m/s; expected all above zero")
     C_nb = dcm_from_euler(heading, pitch, roll)
@@ -286,14 +286,14 @@ def start_from_master(
     return replace(start, time=float(master.time[row]))
 
 
-def _may_have_left(start: Start) -> Start:
-    """The start of a vehicle that departs soon: it may have gained what is not plain yet."""
+def _may_have_left(start: Start, gained: float) -> Start:
+    """The start of a vehicle that departs soon: it may have gained a speed, m/s, that is not plain yet."""
     P = start.P.copy()
-    P[DV, DV] += np.diag([UNSEEN_GAIN, UNSEEN_GAIN, 0.0]) ** 2
+    P[DV, DV] += np.diag([gained, gained, 0.0]) ** 2
     return replace(start, P=P)
 
 
-def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> tuple[Alignment, bool]:
+def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> tuple[Alignment, Departure | None]:
     """The level by the beginning of the log, in which the vehicle goes nowhere, and whether it departs after that.
 
     One that sways in the sea may seem to move.
@@ -303,15 +303,17 @@ def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> tuple[Alignm
     start = record.between(None, longest)
     kinds = ("moving",) if _turns_as_biased(start, spec) else ("moving", "rotating")
     end = min([longest, *(r.start - SEEN_LATE for r in regimes if r.kind in kinds)])
-    leaves = leaves_at(start)
+    seen = departure(start)
+    if seen is not None:
+        end = min(end, seen.time)
     if end - begin >= SHORTEST_LEVEL:
-        end = end if leaves is None else min(end, max(leaves, begin + SHORTEST_LEVEL))
-        return align(record.between(None, end), place, spec), end < longest
+        unseen = Departure(end, UNSEEN_GAIN) if end < longest else None
+        return align(record.between(None, end), place, spec), seen or unseen
     turns = any(r.kind == "rotating" and r.start < longest for r in regimes)
-    if leaves is None and not turns and longest - begin >= SHORTEST_SWAY:
+    if seen is None and not turns and longest - begin >= SHORTEST_SWAY:
         answer = align(start, place, spec)
         if answer.status in ("aligned", "level_only"):
-            return answer, False
+            return answer, None
     first = max(1.0, end + SEEN_LATE - begin)
     raise AlignmentError(
         f"{record.source}: the vehicle moves within the first {first:.0f} s; {SHORTEST_LEVEL + SEEN_LATE:g} s at rest are needed, "
