@@ -49,15 +49,22 @@ def departure(record: ImuRecord) -> Departure | None:
     steady = second_means(unturned((rates[:3] - motion.rate_bias[:, None]) * interval, rates[3:]), per_second)
     views = [_level(steady), _level(second_means(rates[3:], per_second))]
     turns = second_means(rates[:3], per_second)
-    calm = 0
+
+    def share(span: int) -> float:
+        by_push = min(_share(level[:, :span], LEAST_GAIN) for level in views)
+        return max(by_push, _share(turns[:, :span], LEAST_TURN))
+
+    calm, sways = 0, motion.overall == "swaying"
     for span in range(SHORTEST, len(motion.time) + 1):
-        share = max(min(_share(level[:, :span], LEAST_GAIN) for level in views), _share(turns[:, :span], LEAST_TURN))
-        if share > 1.0 and not calm:
+        now, twice = share(span), min(2 * max(calm, SHORTEST), len(motion.time))
+        if now > 1.0 and sways and any(share(later) <= GONE for later in range(span + 1, twice + 1)):
+            continue  # it comes back: the first half was less than a wave
+        if now > 1.0 and not calm:
             return Departure(float(record.time[0]), math.inf)
-        if share > 1.0:
+        if now > 1.0:
             time = float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
             return Departure(time, max(UNSEEN_GAIN, float(_gained(views[0][:, :calm]).max())))
-        if share <= GONE:
+        if now <= GONE:
             calm = span
     return None
 
