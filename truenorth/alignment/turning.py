@@ -119,10 +119,11 @@ def infer_turning(task: Task, biases: Callable[[StaticModel], tuple[Array, Array
     """Specification of an IMU that turns: by its noise, by gravity, whose size shows at any attitude, and by its level rates.
 
     Where it turns on an indexer, `biases` gives what the encoder shows of the gyros' in place of those rates, by the noise:
-    estimates and their sigmas (3,), rad/s.
+    estimates and their sigmas (3,), rad/s. It is not asked of poor gyros: they begin with what it shows, from a wide prior.
     """
     noise = turning_noise(task.record)
-    rates = _level_rates(task, noise) if biases is None else biases(noise)
+    poor = usual("gyro", "bias", noise.gyro_random_walk) >= EARTH_RATE
+    rates = _level_rates(task, noise) if poor or biases is None else biases(noise)
     return with_usual(infer_spec(LogCheck(*rates, *force_size(task)), noise))
 
 
