@@ -1,11 +1,12 @@
 """Until when the beginning of a log goes nowhere: the speed that it gains, since a gentle departure looks like a tilt for long.
 
-A train or a ship gains 0.1 m/s^2 within ten seconds. To a look of half a minute that is a level which drifts. So the mean of
-the specific force over the first half of a span foretells the second half. What it misses there, summed up, is a speed gained: of a
-level that drifts steadily eight times what the first half itself wanders by, of white noise some two to three times. A vehicle that
-sways or is pushed wanders by as much in both halves. The force is looked at twice, in axes of the body, to which poor gyros do no
-harm, and carried by the gyros into axes that do not turn, in which no tilt looks like a push; a departure shows in both. A turn
-shows in the gyros in the same way.
+A train or a ship gains 0.1 m/s^2 within ten seconds. To a look of half a minute that is a level which drifts. So the mean of the
+specific force over the first half of a span foretells the second half. What it misses there, summed up, is a speed gained: of a
+level that drifts steadily eight times what the first half itself wanders by, of white noise some two to three times. A vehicle
+that sways or is pushed wanders by as much in both halves; where the first half is less than a wave, what was missed comes back
+before the span is twice as long. The force is looked at twice, in axes of the body, to which poor gyros do no harm, and carried by
+the gyros into axes that do not turn, in which no tilt looks like a push; a departure shows in both. A turn shows in the gyros in
+the same way.
 """
 
 from __future__ import annotations
@@ -50,22 +51,21 @@ def departure(record: ImuRecord) -> Departure | None:
     views = [_level(steady), _level(second_means(rates[3:], per_second))]
     turns = second_means(rates[:3], per_second)
 
-    def share(span: int) -> float:
-        by_push = min(_share(level[:, :span], LEAST_GAIN) for level in views)
-        return max(by_push, _share(turns[:, :span], LEAST_TURN))
-
+    spans = range(SHORTEST, len(motion.time) + 1)
+    shares = [
+        max(min(_share(level[:, :span], LEAST_GAIN) for level in views), _share(turns[:, :span], LEAST_TURN))
+        for span in spans
+    ]
     calm, sways = 0, motion.overall == "swaying"
-    for span in range(SHORTEST, len(motion.time) + 1):
-        now, twice = share(span), min(2 * max(calm, SHORTEST), len(motion.time))
-        if now > 1.0 and sways and any(share(later) <= GONE for later in range(span + 1, twice + 1)):
-            continue  # it comes back: the first half was less than a wave
-        if now > 1.0 and not calm:
-            return Departure(float(record.time[0]), math.inf)
-        if now > 1.0:
-            time = float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
-            return Departure(time, max(UNSEEN_GAIN, float(_gained(views[0][:, :calm]).max())))
-        if now <= GONE:
+    for k, (span, share) in enumerate(zip(spans, shares, strict=True)):
+        if share <= GONE:
             calm = span
+        if share <= 1.0 or (sways and min(shares[k : 2 * max(calm, SHORTEST) - SHORTEST + 1]) <= GONE):
+            continue
+        if not calm:
+            return Departure(float(record.time[0]), math.inf)
+        time = float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
+        return Departure(time, max(UNSEEN_GAIN, float(_gained(views[0][:, :calm]).max())))
     return None
 
 
