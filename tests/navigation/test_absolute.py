@@ -1,6 +1,7 @@
 """An error that all fixes share is in the position found: sigma has it where nobody says that there is none."""
 
 from dataclasses import replace
+from math import erfc
 from types import SimpleNamespace
 
 import numpy as np
@@ -89,6 +90,7 @@ def test_a_loop_that_follows_a_slow_error_knows_place_no_better_than_that(drive,
     assert sigma[0] == pytest.approx(2.0) if not lasts else np.all((sigma > 4.0) & (sigma < 16.0))
 
 
+UNTRUE = 0.5  # of the variance that a receiver says, one sigma, by which it may be wrong
 SAID, WHITE = 2.0, 0.01  # m: what the receiver says; what an INS that is good against its fixes is off by
 
 
@@ -119,19 +121,38 @@ def test_what_is_not_white_may_be_shared(shared, time):
         found.append((known.sigma[-1, DP] ** 2 - WHITE**2) / SAID**2)
     level, up = np.mean(found, axis=0)[[0, 2]]
     u = np.sqrt(3.0 / 600.0) * max(1.0 - shared, LEAST_SQUARE)  # of the part of one axis
-    # Cut off at 0 and 1, the mean of what may be is off by no more than .8 of that; a slow error of 300 s seems white by 1/300.
-    assert shared - u < level < shared + u + 0.005
-    assert shared - 1.4 * u < up < shared + 1.4 * u + 0.005
+    # A slow error of 300 s seems white by 1/300. Beyond what is shared: what the receiver may be wrong by about its size, a half.
+    most = min(shared + UNTRUE * normal_beyond(-shared / UNTRUE), 1.0)
+    assert shared - u < level < most + u + 0.005
+    assert shared - 1.4 * u < up < most + 1.4 * u + 0.005
+    assert level > most - 0.08
+
+
+def normal_beyond(low):
+    """Mean of a normal variable that is beyond a limit."""
+    return np.exp(-0.5 * low**2) / np.sqrt(2.0 * np.pi) / (0.5 * erfc(low / np.sqrt(2.0)))
 
 
 def test_a_part_is_cut_off_at_nothing_and_at_all():
-    assert shared_part(1.0, 0.1) == pytest.approx(0.1 * np.sqrt(2.0 / np.pi), rel=0.01)  # half of a normal distribution
-    assert shared_part(0.0, 0.1) == pytest.approx(1.0 - 0.1 * np.sqrt(2.0 / np.pi), rel=0.01)
-    assert shared_part(0.5, 0.01) == pytest.approx(0.5, abs=1e-3)
-    assert shared_part(0.5, 10.0) == pytest.approx(0.5, abs=1e-3)  # nothing is seen: any part alike likely
+    m = np.hypot(0.1, UNTRUE)  # what the receiver may be wrong by counts as what is seen of its noise
+    assert shared_part(1.0, 0.1) == pytest.approx(m * np.sqrt(2.0 / np.pi), rel=0.01)  # half of a normal distribution
+    assert shared_part(0.0, 0.1) == pytest.approx(1.0, abs=0.01)
+    assert shared_part(0.0, 0.1) <= 1.0
+    assert shared_part(0.5, 0.01) == pytest.approx(0.5 + UNTRUE * normal_beyond(-1.0), rel=0.01)
+    assert shared_part(0.5, 10.0) == pytest.approx(1.0, abs=0.15)  # nothing is seen: as much as is said
     assert shared_part(1.3, 0.05) == pytest.approx(
-        0.2, abs=0.02
+        0.2 + UNTRUE * normal_beyond(0.6) - 0.3, abs=0.02
     )  # it says too little: by as much again, but for chance
+
+
+def test_ten_white_fixes_a_second_do_not_average_to_nothing():
+    """2000 of 2 cm: a slow error of 1 cm besides, of which nothing is said, is in no innovation, since the filter follows it."""
+    rng = np.random.default_rng(6)
+    track, record, fixes = seen_by(rng, 0.0, np.inf, 2000)
+    sigma = known_as_fixes(track, record, None, fixes=fixes).sigma[-1, DP]
+    assert np.all((sigma > 0.6 * SAID) & (sigma < 0.7 * SAID))
+    silent = known_as_fixes(track, record, 0.0, fixes=fixes)  # who says that there is none is believed
+    assert silent.sigma[-1, DP] == pytest.approx(WHITE)
 
 
 def test_nothing_is_known_of_what_is_shared():

@@ -7,8 +7,9 @@ nothing shows seems to be shown a little: the level of a consumer IMU was known 
 accelerometers leave 1.2, and was up to five of these off. So the last passes feed nothing back. They are linear about the motion
 that the whole log leads back to, with its biases, axes, arm and delay, and with the *prior* covariance, whose heading is any. What
 lies between the prior's values and those is an error that is known at the start. That is Gauss and Newton's method on the log, and
-the prior counts once. Of a log longer than gyros carry an attitude, or than a place by dead reckoning stays near, the first part is
-open; then the loop is closed.
+the prior counts once. What a row is off by is not linear: by the end of such a loop places are off by kilometres
+(:mod:`truenorth.estimate.apart`). Of a log longer than gyros carry an attitude, or than a place by dead reckoning stays near, the
+first part is open; then the loop is closed.
 
 Sources: as of :mod:`truenorth.alignment.transfer_nominal`, which does the same for a slave and its master.
 """
@@ -102,6 +103,7 @@ def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
             every=max(1, round(OUTPUT / INTERVAL)),
             prior=(P, motion.values),
             open_until=until,
+            exact=True,
             off=off,
         )
         back = _led_back(task, model, found, until)

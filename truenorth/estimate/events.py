@@ -36,6 +36,7 @@ class Setting:
     invariant: bool = False  # corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`)
     # s; before it corrections are not fed back: all is linearised about the motion as the start leads to it. None: they always are
     open_until: float | None = None
+    exact: bool = False  # innovations of that loop are those of the motion with its errors taken off
 
     @property
     def grid(self) -> int:

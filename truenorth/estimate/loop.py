@@ -20,6 +20,7 @@ from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
 from truenorth.errors.invariant import keep_reset, reset
+from truenorth.estimate.apart import innovations_there
 from truenorth.estimate.correct import (
     damp_height,
     feed_back,
@@ -61,7 +62,7 @@ class Room(NamedTuple):
     """What an event is worked out in.
 
     `F` (N, N), `rate` (n,), `S` (3, 4), `R` (3,), `now`; `Phi`, `Q` since it, or (0, 0); places of `columns` (N,); `s`, `aux`, `x`
-    of an output.
+    of an output; of a motion whose errors are kept apart `there`, as `now`, and `z` (3,), once they are taken off.
     """
 
     F: Array
@@ -75,6 +76,8 @@ class Room(NamedTuple):
     s: Array
     aux: Array
     x: Array
+    there: Array
+    z: Array
 
 
 @borrowing(forceinline=True)
@@ -105,7 +108,9 @@ def correct(
         w.R[a, a] = R[a]
         if np.isnan(events.variance[k, a]):
             w.z[a] = np.nan
-        if model.opened:
+        elif model.exact:
+            w.z[a] = room.z[a]
+        elif model.opened:
             for b in range(len(m.x)):
                 w.z[a] -= w.H[a, b] * m.x[b]
         kept.innovation[number, a] = w.z[a]
@@ -301,9 +306,13 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
             if retimed:
                 took = together or (m.means.T[0] > 0.0 and abs(behind) < samples.step[max(0, i - 1)])
             if took or not retimed:
-                describe(m, model, now)
+                since = 0.0
                 if retimed:
-                    now[NOW_BEHIND] = here - late.time[r]
+                    since = here - late.time[r]
+                if model.exact:
+                    innovations_there(m, model, sources, of, e, samples, i, since, w, room)
+                describe(m, model, now)
+                now[NOW_BEHIND] = since
                 if sources.instant[source]:
                     describe_instant(samples, i, m.done[0], model, m.aux, now)
                 failure = correct(
@@ -359,6 +368,8 @@ def run(size: Any, task: Task, m: Memory, kept: Kept) -> Any:
         np.zeros(len(m.s)),
         np.zeros(n),
         np.zeros(n),
+        np.zeros(NOW_LENGTH),
+        np.zeros(3),
     )
     for a in range(links):
         room.Phi[a, a] = 1.0

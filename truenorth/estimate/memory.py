@@ -60,7 +60,8 @@ class Sources(NamedTuple):
 class Model(NamedTuple):
     """What of the error model the kernel needs.
 
-    `spare` (s): an event of the grid so soon after another is passed over; `opened`: no correction is fed back before `until` (s).
+    `spare` (s): an event of the grid so soon after another is passed over; `opened`: no correction is fed back before `until` (s);
+    `exact`: innovations are those of the motion with its errors taken off (:mod:`truenorth.estimate.apart`).
     """
 
     dynamics: Dynamics
@@ -74,6 +75,7 @@ class Model(NamedTuple):
     spare: float = 0.0
     opened: bool = False
     until: float = 0.0
+    exact: bool = False
 
 
 class Task(NamedTuple):

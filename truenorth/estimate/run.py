@@ -179,6 +179,7 @@ def navigate_track(
     invariant: bool = False,
     prior: tuple[Array, Array] | None = None,
     open_until: float | None = None,
+    exact: bool = False,
     off: Array | None = None,
 ) -> Track:
     """Mechanise a log from a start, aided by measurements.
@@ -199,12 +200,12 @@ def navigate_track(
         Smooth over the whole log (Rauch, Tung, Striebel).
     invariant : bool
         Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`): for starts with a heading that is far off.
-    prior : (P, values), optional
-        Of all states, see :func:`begin`.
+    prior, off : (P, values) and (n,) array, optional
+        Of all states, and of an open loop: see :func:`begin`.
     open_until : float, optional, s
         Before it no correction is fed back: all is linear about the motion that the start leads to, less whose errors the track is.
-    off : (n,) array, optional
-        Of an open loop, see :func:`begin`.
+    exact : bool
+        Innovations of an open loop are what rows say with those errors taken off, see :mod:`truenorth.estimate.apart`.
 
     Raises
     ------
@@ -222,7 +223,7 @@ def navigate_track(
     steps = interval_lengths(record)
     time = float(record.time[0] - steps[0])
     stride = max(1, round(interval * len(record) / (record.time[-1] - time)))
-    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant, open_until)
+    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant, open_until, exact)
     state, tracks = begin(setting, start, time, record.interval, prior, off), []
     for rows in [slice(0, len(record))] if smooth else row_blocks(len(record)):
         part = ImuRows(record.time[rows], record.gyro[rows], record.accel[rows], record.kind, record.source)
@@ -269,6 +270,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         setting.spare(state.interval),
         setting.open_until is not None,
         setting.open_until or 0.0,
+        setting.exact,
     )
     seen = kernel_sources(sources, model)
     task = Task(state.samples, state.taken, Events(*plan), Events(*late), seen, of_model, horizon)

@@ -6,10 +6,14 @@ hours. So where nobody says how large slow errors are (``Mounting.bias_sigma`` N
 
 What a receiver says of a fix is the size of all its errors, ``s^2 = s_w^2 + s_c^2``: white noise and what fixes share. The white
 part is in the differences of innovations, a share ``q`` of ``s^2`` to within its own sigma ``u``
-(:func:`truenorth.quality.aid_noise.white_part`). What is left is shared, ``c = 1 - q``, and no more: with all shares from 0 to 1
-alike likely beforehand, c is normal about ``1 - q`` with the sigma u, cut off at 0 and 1, and its mean times ``s^2`` is in the
-variance of position. Of white fixes ``c`` is ``.8 u`` in the mean, some ``sqrt(2/N)`` of N fixes: a hundred of them still leave a
-third of what one of them is off by, a thousand a fifth. Fixes that share less than that cannot be separated from white ones.
+(:func:`truenorth.quality.aid_noise.white_part`). What is left is shared, ``c = 1 - q``. But receivers are not exact about their
+size: half as much again is what they differ by (``limit("fix untrue")``), and that is two sigmas here. So a sigma ``s`` is true to
+a quarter, and ``s^2`` to ``m``, a half. With all shares alike likely beforehand, c is normal about ``1 - q`` with the sigma
+``hypot(u, m)``, cut off at 0 and at the most that passes for true, and its mean times ``s^2`` is in the variance of position.
+
+Of white fixes ``c`` is ``.8 m`` in the mean, however many there are: position is never known better than to .6 of a fix. Ten fixes
+a second of 2 cm, of which nothing is shared by what is said, would average to 5 mm within seconds, and 1 cm that lasts for minutes
+is in no innovation: a filter has followed it before it is as large as the noise. Of such receivers sigma was five times too small.
 
 The rule is ours; the estimate of noise is R. Mehra's, see there.
 """
@@ -40,7 +44,7 @@ Array = NDArray[np.float64]
 # m, along the level, of a receiver that says nothing but the kind of its fixes (NMEA 0183): differential, fixed and floating phase
 BY_QUALITY = {2: 1.0, 4: 0.05, 5: 0.5}
 LEVEL, UP = slice(0, 2), slice(2, 3)
-PARTS = 1001  # of a variance, from 0 to 1, that may be shared
+PARTS = 1001  # of a variance that may be shared
 CHANCE = 2.0  # sigmas, beyond which a receiver has more noise than it says
 
 
@@ -103,12 +107,14 @@ def _left(track: Track, record: GnssRecord, shown: Lasting | None, fixes: Aiding
 
 
 def shared_part(white: float, sigma: float) -> float:
-    """Mean of the part of a variance that is not white, from 0 to 1, where the white part is known to a sigma.
+    """Mean of the part of a variance that is not white, where the white part is known to a sigma, and what is said to a half.
 
-    A receiver that has more noise than it says, beyond chance, says too little: by as much again at a time.
+    A receiver that has more noise than it says, beyond chance, says too little: by as much again at a time. No more than all of
+    what it says is shared: beyond that what it says is not true.
     """
-    parts = np.linspace(0.0, 1.0, PARTS)
-    misfit = np.square((parts - (1.0 - white)) / sigma)
+    untrue = limit("fix untrue") - 1.0  # of a square, one sigma: a sigma that is off by as much still passes, and that is two of them
+    parts = np.linspace(0.0, limit("fix untrue") ** 2, PARTS)
+    misfit = np.square((parts - (1.0 - white)) / math.hypot(sigma, untrue))
     weight = np.exp(-0.5 * (misfit - misfit.min()))
     return min(1.0, float(parts @ weight / weight.sum()) + max(0.0, white - 1.0 - CHANCE * sigma))
 

@@ -1,0 +1,73 @@
+"""What rows see of a motion whose errors are kept apart: they are linear about the motion, what they are off by is not.
+
+An open loop's columns are those of the motion that it is linear about, all the time: columns that turn with each correction show
+what nothing shows. Its innovations are another matter. By then that motion may be off by hundreds of metres a second and tens of
+kilometres, and what is left of ``z - H x`` is the product of such errors: north of a place that is off by 10 km is turned by .1 deg,
+and of 150 m/s so turned .25 m/s are left. A filter of which ``z - H x`` was white put out velocities that were ten of their sigmas
+away from what the receiver measured. So innovations are what the rows say of the motion with its known errors taken off, exactly.
+
+Source: G. Huang, A. Mourikis and S. Roumeliotis, "Analysis and improvement of the consistency of extended Kalman filter based
+SLAM", ICRA 2008: Jacobians at first estimates, residuals at the last ones.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from truenorth.core.attitude import cross
+from truenorth.core.compiled import borrowing
+from truenorth.estimate.correct import feed_back, measure
+from truenorth.estimate.memory import Events, Memory, Model, Samples, Sources
+from truenorth.estimate.predict import describe, describe_instant
+from truenorth.state.now import NOW_BEHIND
+from truenorth.strapdown.wander import set_matrix
+
+
+@borrowing(forceinline=True)
+def innovations_there(
+    m: Memory,
+    model: Model,
+    sources: Sources,
+    events: Events,
+    e: int,
+    samples: Samples,
+    i: int,
+    behind: float,
+    w: Any,
+    room: Any,
+) -> None:
+    """Put into `room.z` (3,) what measurement e is off by, the known errors taken off; all else stays as it is.
+
+    Parameters
+    ----------
+    i : int
+        The sample that the loop stands in.
+    behind : float, s
+        How long ago the stamp was.
+    room : Room
+        Of the loop: `there` is made room for by it.
+    """
+    source, s, aux, x, force = events.source[e], m.s, m.aux, m.x, m.means.vectors[0]
+    for a in range(len(s)):
+        room.s[a] = s[a]
+    for a in range(len(aux)):
+        room.aux[a], room.x[a] = aux[a], x[a]
+    turned = cross((x[0], x[1], x[2]), (force[0], force[1], force[2]))
+    was = (force[0], force[1], force[2])
+    feed_back(s, aux, x, model.dynamics.turns)
+    set_matrix(s, m.sums.C_now)
+    for a in range(3):
+        room.R[a] = events.variance[e, a]
+        force[a] += turned[a]
+    describe(m, model, room.there)
+    room.there[NOW_BEHIND] = behind
+    if sources.instant[source]:
+        describe_instant(samples, i, m.done[0], model, aux, room.there)
+    measure(m, model, sources, source, events.measured[e], room.there, w, room.R)
+    for a in range(3):
+        room.z[a], force[a] = w.z[a], was[a]
+    for a in range(len(s)):
+        s[a] = room.s[a]
+    for a in range(len(aux)):
+        aux[a], x[a] = room.aux[a], room.x[a]
+    set_matrix(s, m.sums.C_now)
