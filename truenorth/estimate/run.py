@@ -204,8 +204,7 @@ def navigate_track(
         Of all states, and of an open loop: see :func:`begin`.
     open_until : float, optional, s
         Before it no correction is fed back: all is linear about the motion that the start leads to, less whose errors the track is.
-    exact : bool
-        Innovations of an open loop are what rows say with those errors taken off, see :mod:`truenorth.estimate.apart`.
+        `exact`: innovations are what rows say with those errors taken off (:mod:`truenorth.estimate.apart`).
 
     Raises
     ------
@@ -223,7 +222,8 @@ def navigate_track(
     steps = interval_lengths(record)
     time = float(record.time[0] - steps[0])
     stride = max(1, round(interval * len(record) / (record.time[-1] - time)))
-    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant, open_until, exact)
+    known = covariance or bool(aiding)
+    setting = Setting(model, tuple(aiding), stride, every, known, smooth, invariant, open_until, exact)
     state, tracks = begin(setting, start, time, record.interval, prior, off), []
     for rows in [slice(0, len(record))] if smooth else row_blocks(len(record)):
         part = ImuRows(record.time[rows], record.gyro[rows], record.accel[rows], record.kind, record.source)

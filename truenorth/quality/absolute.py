@@ -112,7 +112,7 @@ def shared_part(white: float, sigma: float) -> float:
     A receiver that has more noise than it says, beyond chance, says too little: by as much again at a time. No more than all of
     what it says is shared: beyond that what it says is not true.
     """
-    untrue = limit("fix untrue") - 1.0  # of a square, one sigma: a sigma that is off by as much still passes, and that is two of them
+    untrue = limit("fix untrue") - 1.0  # one sigma of a square: what still passes for true is two of a size
     parts = np.linspace(0.0, limit("fix untrue") ** 2, PARTS)
     misfit = np.square((parts - (1.0 - white)) / math.hypot(sigma, untrue))
     weight = np.exp(-0.5 * (misfit - misfit.min()))
