@@ -30,6 +30,9 @@ GONE = 0.5  # of the gain that is plain: where it begins to rise
 UNSEEN_GAIN = GONE * LEAST_GAIN  # m/s: of which nothing is seen
 BACK = 2.4  # times from there to where it is plain: of a push that grows, half the speed is gained in 0.7 to 0.8 of the time
 SHORTEST = 10  # s: two halves of five
+WAVES = 60  # s: in the halves of it any sea has more than a wave
+FEWEST_SWINGS = 6  # from one side to the other: three waves
+ASIDE = 0.5  # of the RMS: a swing goes as far
 
 
 class Departure(NamedTuple):
@@ -52,21 +55,52 @@ def departure(record: ImuRecord) -> Departure | None:
     turns = second_means(rates[:3], per_second)
 
     spans = range(SHORTEST, len(motion.time) + 1)
-    shares = [
-        max(min(_share(level[:, :span], LEAST_GAIN) for level in views), _share(turns[:, :span], LEAST_TURN))
-        for span in spans
-    ]
+    shares = [_plain(views, turns, span) for span in spans]
     calm, sways = 0, motion.overall == "swaying"
     for k, (span, share) in enumerate(zip(spans, shares, strict=True)):
         if share <= GONE:
             calm = span
         if share <= 1.0 or (sways and min(shares[k : 2 * max(calm, SHORTEST) - SHORTEST + 1]) <= GONE):
             continue
+        if _goes_to_and_fro(views, turns, range(span + 1, min(len(motion.time), max(2 * calm, WAVES)) + 1)):
+            continue
         if not calm:
             return Departure(float(record.time[0]), math.inf)
         time = float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
         return Departure(time, max(UNSEEN_GAIN, float(_gained(views[0][:, :calm]).max())))
     return None
+
+
+def _plain(views: list[Array], turns: Array, span: int) -> float:
+    """How plain a departure is within the first seconds, as a share of what is enough."""
+    return max(min(_share(level[:, :span], LEAST_GAIN) for level in views), _share(turns[:, :span], LEAST_TURN))
+
+
+def _goes_to_and_fro(views: list[Array], turns: Array, spans: range) -> bool:
+    """Whether over one of these spans a base swings, and goes nowhere: told from its first half and, backwards, from its second.
+
+    One that has left within the first half, and then goes on at its speed, wanders only there.
+    """
+    return any(
+        max(map(_swings, (level[:, :span] for level in views))) >= FEWEST_SWINGS
+        and _plain(views, turns, span) <= GONE
+        and _plain([level[:, span - 1 :: -1] for level in views], turns[:, span - 1 :: -1], span) <= GONE
+        for span in spans
+    )
+
+
+def _swings(rate: Array) -> int:
+    """How often what a rate (3, m) gains goes from one side to the other, along the axis in which it goes farthest.
+
+    A curve is taken off it: what a level that is not known, and drifts, makes of it. A departure swings two or three times about
+    such a curve, a stop and a start in traffic five times.
+    """
+    gained = np.cumsum(rate, axis=1).T
+    curve = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(gained)), 2)
+    gained = gained - curve @ np.linalg.lstsq(curve, gained, rcond=None)[0]
+    way = gained @ np.linalg.eigh(gained.T @ gained)[1][:, -1]
+    sides = np.sign(way[np.abs(way) > ASIDE * np.sqrt(np.mean(way**2))])
+    return int(np.count_nonzero(np.diff(sides)))
 
 
 def _level(force: Array) -> Array:
