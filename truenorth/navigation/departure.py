@@ -60,6 +60,8 @@ def departure(record: ImuRecord) -> Departure | None:
     if found is None and len(motion.time) >= WAVES:
         noise = white_noise(record)
         first, found = WAVE - 1, _found(seen.smooth(float(np.max(noise[3:])), float(np.max(noise[:3]))), sways)
+    if found is None and _had_left(seen, sways):
+        found = SHORTEST, 0
     if found is None:
         return None
     span, calm = found
@@ -123,6 +125,18 @@ def _found(seen: _Seen, sways: bool) -> tuple[int, int] | None:
         if not any(seen.first(n).to_and_fro() for n in longer):
             return span, calm
     return None
+
+
+def _had_left(seen: _Seen, sways: bool) -> bool:
+    """Whether a base that goes on evenly had another force in its first seconds: it left before it was seen to stay."""
+    seconds = seen.turns.shape[1]
+    for span in range(SHORTEST, min(seconds, WAVES) + 1):
+        first = seen.first(span)
+        if first.backwards().plain() <= 1.0 or sways:
+            continue
+        if not any(seen.first(n).to_and_fro() for n in range(span, min(seconds, WAVES) + 1)):
+            return True
+    return False
 
 
 def _smooth(rate: Array) -> Array:
