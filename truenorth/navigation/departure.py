@@ -7,6 +7,10 @@ that sways or is pushed wanders by as much in both halves; where the first half 
 before the span is twice as long. The force is looked at twice, in axes of the body, to which poor gyros do no harm, and carried by
 the gyros into axes that do not turn, in which no tilt looks like a push; a departure shows in both. A turn shows in the gyros in
 the same way.
+
+A base that swings three times within a minute, and goes nowhere by the first half of it nor, backwards, by the second, has not
+departed. Where nothing departs so, means of half a minute show one that departs in waves, and backwards the first seconds show
+one that has gained speed evenly since.
 """
 
 from __future__ import annotations
@@ -102,7 +106,7 @@ class _Seen:
         return max(moved, _share(self.turns, LEAST_TURN + walks * self.turn_walk))
 
     def to_and_fro(self) -> bool:
-        """Whether a base swings, and goes nowhere: told from its first half and, backwards, from its second.
+        """Whether a base swings, and goes nowhere: by its first half and, backwards, by its second.
 
         One that has left within the first half, and then goes on at its speed, wanders only there.
         """
