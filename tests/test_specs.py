@@ -195,6 +195,8 @@ def test_what_no_sensor_can_be_is_refused_with_its_range(tmp_path):
         imu_spec(groups)
     with raises_naming(DataError, "temperature.start", "-1e200 K", "-10000 K to 10000 K"):
         imu_spec({"gyro": {"bias": "1 deg/h"}, "temperature": {"start": "-1e200 K"}})
+    with raises_naming(DataError, "correlation_time", "1e-300 s", ">= 0.0001 s"):
+        imu_spec({"correlation_time": "1e-300 s"})
     with raises_naming(DataError, "accel.bandwidth", "1e-200 Hz", ">= 1e-06 Hz"):
         imu_spec({"accel": {"bandwidth": "1e-200 Hz"}})
     with raises_naming(UsageError, "accel_bias is 1e+200", "1.01972e+13 ug"):

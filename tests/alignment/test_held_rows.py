@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import truenorth as tn
-from tests.runs import some
 from truenorth.core.attitude import euler_from_dcm
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
@@ -46,7 +45,8 @@ def whole(van):
     return tn.align(record, aid=tn.Gnss(gnss), imu="industrial")
 
 
-@pytest.mark.parametrize("how", some(["every second"], ["every third", "110 Hz at 166 Hz"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["every second", "every third", "110 Hz at 166 Hz"])
 def test_a_van_whose_sensor_is_slower_than_its_log(van, whole, how):
     """`inconsistent` before, though within 2.3 sigma."""
     record, gnss, true = van

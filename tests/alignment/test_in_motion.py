@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.runs import few_and_all, some
+from tests.runs import few_and_all
 from truenorth import OdometerRecord, UsageError, VelocityRecord, align, imu_spec, navigate
 from truenorth.aiding.aids import WHEEL, Odometer, VelocityLog
 from truenorth.alignment.in_motion import align_in_motion
@@ -231,8 +231,9 @@ def test_driving_backwards():
     assert align_in_motion(sim.record, RING.imu_spec, odometer=unsigned, position=PLACE).status == "inconsistent"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("imu", "heading", "runs"), some([("industrial", 0.3, 1)], [("industrial", 0.3, 12), ("tactical", 0.1, 40)])
+    ("imu", "heading", "runs"), [("industrial", 0.3, 1), ("industrial", 0.3, 12), ("tactical", 0.1, 40)]
 )
 def test_gnss_from_an_unknown_heading(imu, heading, runs):
     """A van in town, 150 s, with the receiver that the filter supposes where nobody says more.

@@ -152,6 +152,7 @@ def test_the_shipped_van_has_gyros_of_one_moment():
     assert found(answer) == []
 
 
+@pytest.mark.slow
 def test_a_receiver_later_than_it_is_said_to_be():
     """Late by .4 s, said to be on time: the gyros are not at fault."""
     inputs, _ = BENCHES["gnss"].draw(SEED, 0)

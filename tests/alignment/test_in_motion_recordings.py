@@ -207,6 +207,7 @@ def test_car_without_gnss_claims_no_heading():
     assert answer.summary()["heading_deg"] is None
 
 
+@pytest.mark.slow
 def test_a_mast_that_is_not_said():
     """2 m above the IMU on rough ground: velocities that do not show its swing made it -.36 m, known to .13."""
     record, _ = recordings.stim300_cart_chicago()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import truenorth
-from tests.runs import few_and_all, some
+from tests.runs import some
 from truenorth.alignment.in_motion_passes import turn_between
 from truenorth.alignment.in_motion_start import guesses_all_round
 from truenorth.alignment.in_motion_task import moving_task
@@ -41,7 +41,8 @@ def task_of(record, odometer, imu="consumer"):
     return moving_task(record, imu, odometer, None, PLACE, None, None, (), True, None, 0.0)
 
 
-@few_and_all(30, few=1)
+@pytest.mark.slow
+@pytest.mark.parametrize("runs", [30])
 def test_level_is_what_turns_tell(runs):
     """Before: level 3.9 of its sigma, up to 10.5. Two numbers a run; false alarms 1 in 1000."""
     total = 0.0

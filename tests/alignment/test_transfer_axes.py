@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.runs import few_and_all
 from truenorth.aiding.matching import matched
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_axes import slave_axes
@@ -116,7 +115,8 @@ def test_a_turn_of_ten_seconds_asks_for_the_axes_of_accelerometers():
         assert {g.name for g in slave_axes(slave, master, TACTICAL, Assumed(), matched("both", master))} == expected
 
 
-@few_and_all(24, few=1)
+@pytest.mark.slow
+@pytest.mark.parametrize("runs", [24])
 def test_a_cheap_slave_far_from_its_master(runs):
     """15 to 40 m: before, 8 of 8 ships had a level, a heading or an arm beyond 3 sigmas (18 at the most), 7 of them beyond 4."""
     total = 0.0

@@ -26,6 +26,7 @@ def test_the_log_says_of_which_grade(imu):
     assert max(float(np.abs(off).max()) for off in misses(answer, truth).values()) < 4.0
 
 
+@pytest.mark.slow
 def test_a_grade_that_is_given_is_not_changed():
     """What somebody said is judged, and not replaced."""
     inputs, _ = slave(0, "consumer")

@@ -108,6 +108,7 @@ def test_a_high_sea_takes_a_ship_nowhere(runs):
         assert np.all(np.abs(phi) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_gyro_matrix")
 def test_a_ship_that_manoeuvres_in_the_same_sea_does_not_stay():
     """It gathers way and stops again: tens of metres are no sway."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import truenorth as tn
+from tests.runs import some
 from truenorth.alignment.result import Alignment
 from truenorth.errors.axes import proper_bias
 from truenorth.simulation.runs import Simulation
@@ -42,7 +43,7 @@ def test_without_states_of_the_axes_they_are_in_sigma() -> None:
     np.testing.assert_allclose(sigma[0], 3.0)
 
 
-@pytest.fixture(scope="module", params=range(2))
+@pytest.fixture(scope="module", params=some([0], [1]))
 def drive(request: pytest.FixtureRequest) -> tuple[Simulation, tn.Gnss, Alignment]:
     scenario = read_scenario({**read_scenario("van").to_mapping(), "duration": "150 s"})
     driven, logs = scenario.simulate(run=request.param), scenario.simulate_aiding(run=request.param)

@@ -31,7 +31,7 @@ def notes(record):
 
 
 @pytest.mark.parametrize("cell", ["a\nb", "a, b\r\n\r\nc", 'he said ""go""\nthen left', "$GPGGA,1,2\r\n"])
-@pytest.mark.parametrize("place", ["first", "second", "last"])
+@pytest.mark.parametrize("place", some(["second"], ["first", "last"]))
 def test_a_line_end_in_a_quoted_cell(tmp_path, cell, place):
     """It is one row by the rules of CSV, wherever the cell stands."""
     path, where = tmp_path / "log.csv", {"first": 0, "second": 1, "last": 7}[place]

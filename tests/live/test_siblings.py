@@ -107,7 +107,7 @@ def test_chunks_and_questions_change_no_bit_nor_does_a_run_that_was_saved(tmp_pa
     """One that is asked often and one that is never asked before its end, one row at a time, and half of it from a file."""
     case = Anchored(CALM, "consumer", 120.0, 3)
     asked, silent, saved = case.run(), case.run(), case.run()
-    case.feed(asked, 25, every=1.0)
+    case.feed(asked, 25, every=4.0)
     case.feed(silent, 1)
     case.feed(saved, 25, until=43.0)
     saved.save(tmp_path / "run.npz")

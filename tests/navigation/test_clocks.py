@@ -96,6 +96,7 @@ def test_a_late_antenna_that_the_road_swings():
     assert lag["value"][0] == pytest.approx(late, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_delay_that_an_alignment_has_found_is_taken_over(drive):
     motion, record, start = drive
     times = np.arange(1.0, 179.0)

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 import truenorth as tn
 from truenorth.aiding.aids import Gnss
 from truenorth.navigation import gyro_moment
@@ -11,6 +13,7 @@ WRONG = -3.0  # s: what a state that is linear in the delay made of a crane's tu
 SHARE = 0.2  # of the measurements
 
 
+@pytest.mark.slow
 def test_a_delay_that_spoils_the_run_is_not_taken(monkeypatch) -> None:
     van = read_scenario({**read_scenario("van").to_mapping(), "duration": "120 s"})
     driven, logs = van.simulate(run=0), van.simulate_aiding(run=0)

@@ -94,6 +94,7 @@ def test_odometer_bounds_what_free_inertial_does_not(drive):
     assert any("no sensor of height" in reason for reason in aided.reasons)
 
 
+@pytest.mark.slow
 def test_gnss_with_a_latency_and_a_clock_offset(drive):
     """An offset of 300 ms is found with its sign; given, or as latency, it is gone."""
     motion, record, start = drive
@@ -254,7 +255,7 @@ def test_files_with_late_rows_navigate_as_sorted_ones(drive, tmp_path):
     from truenorth.formats import read_gnss, read_odometer, write_record
 
     motion, record, start = drive
-    time = np.arange(0.5, 179.0, 0.5)
+    record, time = record.between(None, 60.0), np.arange(0.5, 59.0, 0.5)
     write_record(fixes(motion, time, with_velocity=True), tmp_path / "gnss.csv")
     total = np.cumsum(np.linalg.norm(motion.states(time).v_n, axis=1)) * 0.5
     rows = [f"{t},{x}" for t, x in zip(time, total)]
@@ -265,16 +266,16 @@ def test_files_with_late_rows_navigate_as_sorted_ones(drive, tmp_path):
         results.append(navigate(record, start, aid=[Gnss(gnss), Odometer(odometer)], imu=SPEC))
         for name in ("gnss.csv", "odo.csv"):
             header, *lines = (tmp_path / name).read_text().splitlines()
-            lines[20:320:3], lines[21:321:3] = lines[21:321:3], lines[20:320:3]
+            lines[10:100:3], lines[11:101:3] = lines[11:101:3], lines[10:100:3]
             (tmp_path / name).write_text("\n".join([header, *lines]) + "\n")
     right, found = results
     np.testing.assert_array_equal(found.position, right.position)
     np.testing.assert_array_equal(found.C_nb, right.C_nb)
     np.testing.assert_array_equal(found.track.P, right.track.P)
-    assert found.summary()["late_rows"] == {name: {"rows": 100, "longest_s": 0.5} for name in ("gnss", "odometer")}
+    assert found.summary()["late_rows"] == {name: {"rows": 30, "longest_s": 0.5} for name in ("gnss", "odometer")}
     assert right.summary()["late_rows"] == {}
     assert [r for r in found.reasons if r not in right.reasons] == [
-        f"{name}: 100 rows stood after rows of later times, by up to 0.5 s: put in order"
+        f"{name}: 30 rows stood after rows of later times, by up to 0.5 s: put in order"
         for name in ("gnss.csv", "odo.csv")
     ]
 

@@ -35,6 +35,7 @@ def wheel_log(motion, arm=(0.0, 0.0, 0.0), noise=0.02):
     )
 
 
+@pytest.mark.slow
 def test_an_antenna_of_a_metre_given_in_centimetres(drive):
     """.2, .3 and .5 m given as 20, 30, 50: the fixes are rejected, and the second look says why and what the arm is."""
     motion, record, start = drive

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests import recordings
+from tests.runs import some
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.attitude import dcm_from_rotation_vector
@@ -87,7 +88,7 @@ def test_one_in_so_many_is_found_on_every_procedure(procedure, period):
 
 
 @pytest.mark.parametrize("part", [1 / 3, 1 / 5, 2 / 5])
-@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize("seed", some(range(5), range(5, 15)))
 def test_an_engine_near_a_part_of_the_rate_is_none(seed, part):
     rng = np.random.default_rng([seed, 771241])
     frequency = RATE * part + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-2.0, 1.0)
@@ -104,7 +105,7 @@ def test_a_beat_that_goes_round_once_in_a_stretch_is_a_vibration(period):
         assert not alternation_evidence(shaken)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", some(range(8), range(8, 30)))
 def test_sound_logs_do_not_alternate(seed):
     """Noise, an engine that idles near half the rate, and counters whose steps hide the noise."""
     rng = np.random.default_rng([seed, 7])

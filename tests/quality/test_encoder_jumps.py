@@ -107,7 +107,8 @@ def test_a_short_log_shows_nothing():
     assert jump_evidence(np.arange(100.0), np.zeros((100, 2)), np.zeros((100, 2))) == []
 
 
-@few_and_all(6, few=1)
+@pytest.mark.slow
+@pytest.mark.parametrize("runs", [6])
 def test_an_indexer_that_slips_is_no_longer_silent(runs):
     """Seed 9100, run 5: .31 deg of the inner axis were 143 sigmas of level, `aligned`."""
     for run in range(5, 5 - runs, -1):

@@ -25,7 +25,9 @@ from truenorth.coarse.analytic import BLOCKS, Means, scatter_of, static_covarian
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError
 from truenorth.errors.staying import StaticModel
+from truenorth.quality.own_velocity import own_velocity
 from truenorth.records.specs import ImuSpec
+from truenorth.state.limits import limit
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.level import inertial_integrals
 
@@ -64,7 +66,8 @@ def from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
     covariance = covariance + moved**2 * np.eye(3)
     if carried:  # the mean rate is the base's own
         covariance, floor = without_heading(covariance), without_heading(floor)
-    return assemble(task, used, where, C_nb, covariance, floor), check
+    answer = assemble(task, used, where, C_nb, covariance, floor)
+    return replace(answer, disturbance=_own_velocity(task)), check
 
 
 def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
@@ -99,7 +102,12 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     own = float(np.linalg.norm(task.means.w_ib_b)) if moves else 0.0
     bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2) + own**2)
     bias = task.means.w_ib_b - EARTH_RATE * math.sin(task.position.lat) * up
-    return replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma), check
+    return replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma, disturbance=_own_velocity(task)), check
+
+
+def _own_velocity(task: Task) -> Array:
+    """(3,) RMS velocity of the base's own motion, m/s; what is faster than any base is tilt."""
+    return np.minimum(own_velocity(task.record), limit("fastest base"))
 
 
 def _louder(a: StaticModel, b: StaticModel) -> StaticModel:

@@ -6,6 +6,9 @@ that stays, the log gives a heading of its own, and a check: along north and alo
 to within their biases. A vehicle that did move, and turned by what the aids say, would meet both by chance alone. So where the log
 as at rest is without contradiction, and its heading is another, the aids are wrong.
 
+Gyros whose biases may be as large as the earth's rate meet both anyhow, and are not asked. Nor is the whole alignment made where a
+coarse one, a tenth of its time, has about the heading of the aids, nor the search for gyros that are turned before it is needed.
+
 A steady speed towards north turns the heading of a base that is taken to stay by ``v / (R w_ie cos L)``, and meets the check: so
 much is allowed for.
 """
@@ -28,6 +31,7 @@ from truenorth.core.attitude import euler_from_dcm
 from truenorth.core.earth import EARTH_RATE, radii
 from truenorth.core.errors import TruenorthError
 from truenorth.navigation.stops import longest_rest, stops_in
+from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
 from truenorth.state.layout import PHI
@@ -55,23 +59,37 @@ def led_at_rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
     if not len(inside):
         return []
     end = int(inside[-1])
-    rest = _as_at_rest(task, begin, float(track.time[end]))
-    if rest is None:
-        return []
     lat, C = task.position.lat, track.C_nb[end]
     horizontal = EARTH_RATE * math.cos(lat)
-    heading = float(euler_from_dcm(C)[0])
-    off = abs(turn_between(C, rest.C_nb))
-    doubt = max((item.effect.heading for item in rest.evidence), default=0.0)
-    sigma = math.hypot(azimuth_sigmas(rest)[0], doubt, math.sqrt(fifteen(track)[end, PHI, PHI][2, 2]))
-    off -= abs(float(np.mean(track.v_n[inside, 1]))) / (float(radii(lat)[0]) * horizontal)
-    turns = 2.0 * horizontal * math.sin(0.5 * max(off, 0.0))  # between the two headings of the earth's rate
-    if off < limit("led at rest") * sigma or turns < BY_CHANCE * float(np.max(rest.gyro_bias_prior)):
+    if 2.0 * horizontal < BY_CHANCE * math.sqrt(float(np.max(task.spec.bias_variance[:3]))):
+        return []
+    north = abs(float(np.mean(track.v_n[inside, 1]))) / (float(radii(lat)[0]) * horizontal)
+    stretch, own = task.record.between(begin, float(track.time[end])), float(fifteen(track)[end, PHI, PHI][2, 2])
+
+    def turned(rest: Alignment, biases: float) -> float:
+        """How far its heading is off, rad; 0 where the earth's rate turns by less than so many biases between the two."""
+        off = max(abs(turn_between(C, rest.C_nb)) - north, 0.0)
+        return off if 2.0 * horizontal * math.sin(0.5 * off) >= biases * float(np.max(rest.gyro_bias_prior)) else 0.0
+
+    def led(rest: Alignment | None) -> bool:
+        if rest is None:
+            return False
+        doubt = max((item.effect.heading for item in rest.evidence), default=0.0)
+        sigma = math.hypot(azimuth_sigmas(rest)[0], doubt, math.sqrt(own))
+        return turned(rest, BY_CHANCE) >= limit("led at rest") * sigma
+
+    coarse = _as_at_rest(task, stretch, method="oba")
+    if coarse is not None and not turned(coarse, 0.5 * BY_CHANCE):
+        return []
+    if not led(_as_at_rest(task, stretch, causes=False)):
+        return []
+    rest = _as_at_rest(task, stretch)
+    if rest is None or not led(rest):
         return []
     figures: dict[str, Any] = {
         "rest": rest.heading,
         "rest_sigma": azimuth_sigmas(rest)[0],
-        "heading": heading,
+        "heading": float(euler_from_dcm(C)[0]),
         "begin": begin,
         "end": float(track.time[end]),
         "speed": float(np.max(np.linalg.norm(track.v_n[inside, :2], axis=1))),
@@ -79,10 +97,10 @@ def led_at_rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
     return [contradiction("innovations.at_rest", **figures)]
 
 
-def _as_at_rest(task: MovingTask, begin: float, end: float) -> Alignment | None:
+def _as_at_rest(task: MovingTask, stretch: ImuRecord, **how: Any) -> Alignment | None:
     """The stretch aligned as of a base that stays; None where that cannot be, or is contradicted."""
     try:
-        answer = align_base(task.record.between(begin, end), task.position, _without_lags(task.spec))
+        answer = align_base(stretch, task.position, _without_lags(task.spec), **how)
     except TruenorthError:
         return None
     return answer if answer.status == "aligned" else None

@@ -101,6 +101,7 @@ def align_base(
     progress: Callable[[str], None] | None = None,
     sound: bool = False,
     goes_on: bool = True,
+    causes: bool = True,
 ) -> Alignment:
     """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying.
 
@@ -124,6 +125,8 @@ def align_base(
         one all along, as a simulated one is: then it is not looked at for them.
     goes_on : bool
         Whether rows that follow, or navigation, may go on from the answer: what only they need is made then.
+    causes : bool
+        Whether gyros that are turned or scaled are searched for where the log does not fit, which may take ten seconds.
 
     Raises
     ------
@@ -164,7 +167,7 @@ def align_base(
     elif chosen == "analytic":
         found = _Found(*from_means(task, spec))
     else:
-        found = _align_inertial(task, spec, chosen, means, sound, goes_on)
+        found = _align_inertial(task, spec, chosen, means, sound, goes_on, causes)
         if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit, inferred=True):
             chosen, why, found = "analytic", NO_NORTH, _Found(*level_from_means(task, spec))
         elif method == "auto" and spec is None and was_blind(task, found.answer.imu):
@@ -259,7 +262,7 @@ def _moves_on(task: Task, fine: FineAlignment) -> Array:
 
 
 def _align_inertial(
-    task: Task, spec: ImuSpec | None, method: str, means: LogCheck, sound: bool, goes_on: bool
+    task: Task, spec: ImuSpec | None, method: str, means: LogCheck, sound: bool, goes_on: bool, causes: bool
 ) -> _Found:
     lat, alt, rows = task.position.lat, task.position.alt, np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
@@ -347,7 +350,7 @@ def _align_inertial(
         steps += late_gyros_evidence(fine, fine.late, task.record)
         anew = aligned_anew(fine, start, turned=turned, axes=spec)
         steps += late_gyro_evidence(fine, task.record, anew) + scale_on_sway_evidence(fine, task.record, anew)
-        steps += gyro_matrix_evidence(fine, task.record, likely, anew, steps)
+        steps += gyro_matrix_evidence(fine, task.record, likely, anew, steps) if causes else []
     way = farthest(fine, task.position) if swung else math.inf
     moved = _moves_on(task, fine) if swung else None
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave, moved)

@@ -127,7 +127,8 @@ class Alignment(Shown):
     duration : float, s
         Length of data used.
     disturbance : (3,) array, m/s
-        RMS velocity of the base's own motion (E, N, U); NaN where the method does not see it.
+        RMS velocity of the base's own motion (E, N, U); NaN where the method does not see it. By means both level ones are the
+        largest of any direction.
     pays_until : float or None, s
         Length of data after which the random part of heading's sigma is below half its floor.
     history : History or None

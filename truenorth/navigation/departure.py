@@ -7,29 +7,39 @@ that sways or is pushed wanders by as much in both halves; where the first half 
 before the span is twice as long. The force is looked at twice, in axes of the body, to which poor gyros do no harm, and carried by
 the gyros into axes that do not turn, in which no tilt looks like a push; a departure shows in both. A turn shows in the gyros in
 the same way.
+
+A base that swings three times within a minute, and goes nowhere by the first half of it nor, backwards, by the second, has not
+departed. Where nothing departs so, means of half a minute show one that departs in waves, and backwards the first seconds show
+one that has gained speed evenly since.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.quality.regimes import motion_summary
-from truenorth.quality.signals import even_rates, second_means, unturned
+from truenorth.quality.signals import even_rates, second_means, unturned, white_noise
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
 
 LEAST_GAIN = 0.03  # m/s: what people getting in, and a vehicle that settles on its springs, leave
 LEAST_TURN = np.radians(0.3)
+BY_NOISE = 5.0  # times the random walk over half a span: means of half a minute hardly wander, and are no better known
 WANDERS = 10.0  # times what the first half wanders by
 GONE = 0.5  # of the gain that is plain: where it begins to rise
 UNSEEN_GAIN = GONE * LEAST_GAIN  # m/s: of which nothing is seen
 BACK = 2.4  # times from there to where it is plain: of a push that grows, half the speed is gained in 0.7 to 0.8 of the time
 SHORTEST = 10  # s: two halves of five
+WAVES = 60  # s: in the halves of it any sea has more than a wave
+WAVE = 15  # s
+FEWEST_SWINGS = 6  # from one side to the other: three waves
+ASIDE = 0.5  # of the RMS: a swing goes as far
 
 
 class Departure(NamedTuple):
@@ -48,25 +58,109 @@ def departure(record: ImuRecord) -> Departure | None:
     per_second = max(1, round(1.0 / interval))
     rates = rates[:, : len(motion.time) * per_second]
     steady = second_means(unturned((rates[:3] - motion.rate_bias[:, None]) * interval, rates[3:]), per_second)
-    views = [_level(steady), _level(second_means(rates[3:], per_second))]
-    turns = second_means(rates[:3], per_second)
+    forces = (_level(steady), _level(second_means(rates[3:], per_second)))
+    seen, sways = _Seen(forces, second_means(rates[:3], per_second)), motion.overall == "swaying"
+    first, found = 0, _found(seen, sways)
+    if found is None and len(motion.time) >= WAVES:
+        noise = white_noise(record)
+        first, found = WAVE - 1, _found(seen.smooth(float(np.max(noise[3:])), float(np.max(noise[:3]))), sways)
+    if found is None and _had_left(seen, sways):
+        found = SHORTEST, 0
+    if found is None:
+        return None
+    span, calm = found
+    if not calm:
+        return Departure(float(record.time[0]), math.inf)
+    time = float(motion.time[first + calm - 1] - BACK * (span - calm) * per_second * interval)
+    return Departure(time, max(UNSEEN_GAIN, float(_gained(forces[0][:, : first + calm]).max())))
 
-    spans = range(SHORTEST, len(motion.time) + 1)
-    shares = [
-        max(min(_share(level[:, :span], LEAST_GAIN) for level in views), _share(turns[:, :span], LEAST_TURN))
-        for span in spans
-    ]
-    calm, sways = 0, motion.overall == "swaying"
-    for k, (span, share) in enumerate(zip(spans, shares, strict=True)):
+
+@dataclass(frozen=True)
+class _Seen:
+    """Second by second, the level specific force (3, m) in two sets of axes, and the turns; noise beyond what it wanders by."""
+
+    forces: tuple[Array, Array]
+    turns: Array
+    force_walk: float = 0.0  # m/s/sqrt(s)
+    turn_walk: float = 0.0  # rad/sqrt(s)
+
+    def first(self, span: int) -> _Seen:
+        """Of the first seconds."""
+        a, b = self.forces
+        return _Seen((a[:, :span], b[:, :span]), self.turns[:, :span], self.force_walk, self.turn_walk)
+
+    def backwards(self) -> _Seen:
+        """The last second first."""
+        a, b = self.forces
+        return _Seen((a[:, ::-1], b[:, ::-1]), self.turns[:, ::-1], self.force_walk, self.turn_walk)
+
+    def smooth(self, force_walk: float, turn_walk: float) -> _Seen:
+        """In which there are no waves: means of half a minute, the middle of which counts most."""
+        a, b = self.forces
+        return _Seen((_smooth(a), _smooth(b)), _smooth(self.turns), force_walk, turn_walk)
+
+    def plain(self) -> float:
+        """How plain a departure is, as a share of what is enough."""
+        walks = BY_NOISE * math.sqrt(0.5 * self.turns.shape[1])
+        moved = min(_share(force, LEAST_GAIN + walks * self.force_walk) for force in self.forces)
+        return max(moved, _share(self.turns, LEAST_TURN + walks * self.turn_walk))
+
+    def to_and_fro(self) -> bool:
+        """Whether a base swings, and goes nowhere: by its first half and, backwards, by its second.
+
+        One that has left within the first half, and then goes on at its speed, wanders only there.
+        """
+        swings = max(map(_swings, self.forces)) >= FEWEST_SWINGS
+        return swings and self.plain() <= GONE and self.backwards().plain() <= GONE
+
+
+def _found(seen: _Seen, sways: bool) -> tuple[int, int] | None:
+    """After how many seconds a departure is plain, and for how many the base is calm before."""
+    seconds = seen.turns.shape[1]
+    shares = [seen.first(span).plain() for span in range(SHORTEST, seconds + 1)]
+    calm = 0
+    for k, share in enumerate(shares):
+        span = SHORTEST + k
         if share <= GONE:
             calm = span
         if share <= 1.0 or (sways and min(shares[k : 2 * max(calm, SHORTEST) - SHORTEST + 1]) <= GONE):
             continue
-        if not calm:
-            return Departure(float(record.time[0]), math.inf)
-        time = float(motion.time[calm - 1] - BACK * (span - calm) * per_second * interval)
-        return Departure(time, max(UNSEEN_GAIN, float(_gained(views[0][:, :calm]).max())))
+        longer = range(span + 1, min(seconds, max(2 * calm, WAVES)) + 1)
+        if not any(seen.first(n).to_and_fro() for n in longer):
+            return span, calm
     return None
+
+
+def _had_left(seen: _Seen, sways: bool) -> bool:
+    """Whether a base that goes on evenly had another force in its first seconds: it left before it was seen to stay."""
+    seconds = seen.turns.shape[1]
+    for span in range(SHORTEST, min(seconds, WAVES) + 1):
+        first = seen.first(span)
+        if first.backwards().plain() <= 1.0 or sways:
+            continue
+        if not any(seen.first(n).to_and_fro() for n in range(span, min(seconds, WAVES) + 1)):
+            return True
+    return False
+
+
+def _smooth(rate: Array) -> Array:
+    """(3, m - 28) means of a rate (3, m), weighed by a triangle."""
+    weight = np.convolve(np.ones(WAVE), np.ones(WAVE)) / WAVE**2
+    return np.stack([np.convolve(row, weight, mode="valid") for row in rate])
+
+
+def _swings(rate: Array) -> int:
+    """How often what a rate (3, m) gains goes from one side to the other, along the axis in which it goes farthest.
+
+    A curve is taken off it: what a level that is not known, and drifts, makes of it. A departure swings two or three times about
+    such a curve, a stop and a start in traffic five times.
+    """
+    gained = np.cumsum(rate, axis=1).T
+    curve = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(gained)), 2)
+    gained = gained - curve @ np.linalg.lstsq(curve, gained, rcond=None)[0]
+    way = gained @ np.linalg.eigh(gained.T @ gained)[1][:, -1]
+    sides = np.sign(way[np.abs(way) > ASIDE * np.sqrt(np.mean(way**2))])
+    return int(np.count_nonzero(np.diff(sides)))
 
 
 def _level(force: Array) -> Array:

@@ -78,8 +78,16 @@ def with_heading(alignment: Alignment, heading: float, sigma: float) -> Alignmen
         )
     known = _measured if alignment.handover is not None else _turned
     answer = known(alignment, heading, sigma)
+    answer = replace(answer, disturbance=_turned_too(alignment.disturbance, answer.C_nb @ alignment.C_nb.T))
     said = note("heading.given", heading=math.degrees(heading % (2.0 * math.pi)), sigma=sigma)
     return replace(answer, status="aligned", evidence=(*answer.evidence, said), history=None)
+
+
+def _turned_too(velocity: Array, turn: Array) -> Array:
+    """(3,) RMS velocities after a turn about the vertical: what they are at most, since how they go together is not known."""
+    east, north, up = velocity
+    c, s = abs(float(turn[0, 0])), abs(float(turn[0, 1]))
+    return np.array([c * east + s * north, s * east + c * north, up])
 
 
 def _measured(alignment: Alignment, heading: float, sigma: float) -> Alignment:

@@ -16,7 +16,7 @@ from truenorth.core.errors import DataError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
 from truenorth.estimate.moments import explained_by_two, velocities_apart
-from truenorth.estimate.other_clocks import best_clock
+from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
 from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
@@ -101,12 +101,13 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     said: list[Evidence] = []
     asked = given
     track = plan.run(plan.sources(given), smooth=smooth)
+    first = plan, track
     plan, track = _with_late_swing(plan, given, track, smooth)
     plan, track = _with_swing_apart(plan, given, track, smooth)
     plan, track = _not_lost(plan, given, track, smooth)
     plan, track = _as_noisy(plan, given, track, smooth)
     said += noise_notes(plan.factors)
-    given, track, unsure = _on_another_clock(plan, given, track, smooth)
+    plan, given, track, unsure = _on_another_clock(plan, first, given, track, smooth)
     said += unsure
     later = delayed(plan, given, track)
     if later is not given:
@@ -275,20 +276,31 @@ def _with_swing(plan: Plan, given: dict[str, Any], track: Track, arm: Array, sha
 
 
 def _on_another_clock(
-    plan: Plan, given: dict[str, Any], track: Track, smooth: bool
-) -> tuple[dict[str, Any], Track, list[Evidence]]:
-    """The aids and their track on a receiver's clock that runs far apart from the IMU's, where the log says so; else the same."""
+    plan: Plan, first: tuple[Plan, Track], given: dict[str, Any], track: Track, smooth: bool
+) -> tuple[Plan, dict[str, Any], Track, list[Evidence]]:
+    """The plan, aids and track on a receiver's clock that runs far apart from the IMU's, where the log says so; else the same.
+
+    A swing that is shown late takes up a part of what a clock does: so the first pass, that has no such swing, is asked as well,
+    and the likelier of the two is gone on with.
+    """
     receiver = given.get(Gnss.key)
     if not isinstance(receiver, Gnss) or receiver.mounting is None:
-        return given, track, []
+        return plan, given, track, []
+    antenna = receiver.mounting
 
-    def run(antenna: Mounting) -> Track:
-        return plan.run(plan.sources({**given, Gnss.key: receiver.mounted(antenna)}), smooth=smooth)
+    def asked(of: Plan, seen: Track) -> tuple[Mounting | None, Track, list[Evidence]]:
+        def run(other: Mounting) -> Track:
+            return of.run(of.sources({**given, Gnss.key: receiver.mounted(other)}), smooth=smooth)
 
-    best, unsure = best_clock(run, receiver.mounting, track)
-    if best is None:
-        return given, track, unsure
-    return {**given, Gnss.key: receiver.mounted(best.antenna)}, best.track, unsure
+        best, unsure = best_clock(run, antenna, seen)
+        return (None, seen, unsure) if best is None else (best.antenna, best.track, unsure)
+
+    clock, found, unsure = asked(plan, track)
+    if plan.late:
+        other, fitted_by, _ = asked(*first)
+        if other is not None and clock_ratio(found, fitted_by, clock or antenna, other) > 0.0:
+            plan, clock, found, unsure = first[0], other, fitted_by, []
+    return plan, given if clock is None else {**given, Gnss.key: receiver.mounted(clock)}, found, unsure
 
 
 def _of_two_moments(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[dict[str, Any], Track]:

@@ -161,8 +161,8 @@ def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late
         return source
     _, quick = _quick(record, source.time)
     middle = record.time - 0.5 * record.steps
-    slow, change = (_at(middle, of, source.time) if late else np.zeros_like(quick) for of in slow_rates(record))
-    shown = replace(source, kind=SMOOTHED_VELOCITY, measured=np.hstack([source.measured, quick, slow, change]))
+    slow = [_at(middle, of, source.time) for of in slow_rates(record)] if late else [np.zeros_like(quick)] * 2
+    shown = replace(source, kind=SMOOTHED_VELOCITY, measured=np.hstack([source.measured, quick, *slow]))
     if estimated is None:
         swings = np.linalg.norm(np.cross(quick, source.lever_arm), axis=1)
         if not known or math.sqrt(float(np.mean(swings**2))) < SEEN * float(np.nanmedian(source.sigma)):
@@ -182,6 +182,13 @@ def _quick(record: ImuRecord, time: Array) -> tuple[Array, Array]:
 
     Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
     """
+    return _quick_at(record, time.tobytes())
+
+
+@remembered
+def _quick_at(record: ImuRecord, times: bytes) -> tuple[Array, Array]:
+    """The same; most passes ask at the times of the one before."""
+    time = np.frombuffer(times)
     half = _filters(time)
     middle, rates, means = _rates(record, half)
     now = _at(middle, rates, time)

@@ -31,7 +31,8 @@ MOST = {
 }
 BEYOND = 1e12  # times that: what several terms and a log together may make of one, and no square overflows
 FARTHEST = 100.0  # m, of an accelerometer from the centre of its IMU
-SLOWEST = 1e-6  # Hz: a sensor that takes eleven days for a turn
+# The least of what is above zero: a sensor that takes eleven days for a turn (Hz), what lasts no longer than a row (s).
+LEAST = {"frequency": 1e-6, "time": 1e-4}
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Entry:
     def bounds(self) -> tuple[float, float]:
         """The least and the largest value that a sensor can have, in SI."""
         if self.least == "above zero":
-            return SLOWEST if self.dimension == "frequency" else 0.0, math.inf
+            return LEAST.get(self.dimension, 0.0), math.inf
         most = MOST[self.dimension]
         return -most if self.least == "finite" else 0.0, most
 
