@@ -3,8 +3,9 @@
 An open loop's columns are those of the motion that it is linear about, all the time: columns that turn with each correction show
 what nothing shows. Its innovations are another matter. By its end that motion may be off by a hundred metres a second and ten
 kilometres, and what is left of ``z - H x`` is the product of such errors: north of a place that is off by 10 km is turned by
-.1 deg, and of 100 m/s so turned .2 m/s are left. A filter of which ``z - H x`` was white put out velocities that were ten of their sigmas
-away from what the receiver measured. So innovations are what the rows say of the motion with its known errors taken off, exactly.
+.1 deg, and of 100 m/s so turned .2 m/s are left. A filter of which ``z - H x`` was white put out velocities that were ten of
+their sigmas away from what the receiver measured. So innovations are what the rows say of the motion with its known errors
+taken off, exactly.
 
 Source: G. Huang, A. Mourikis and S. Roumeliotis, "Analysis and improvement of the consistency of extended Kalman filter based
 SLAM", ICRA 2008: Jacobians at first estimates, residuals at the last ones.
