@@ -28,6 +28,7 @@ ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
 BASELINE = math.radians(1.0)  # of a second antenna said to be ahead of the first
 # m, of an antenna of which nothing is said: a metre or two on cars, 10 to 20 m on lorries, aircraft, ships
 VEHICLE_ARM = 5.0
+HULL = 15.0  # m: how far from the IMU a velocity log may sit of which nothing is said, under a ship's bow
 LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
 ANTENNA = Mounting(  # of which nothing is said
     lever_arm_sigma=VEHICLE_ARM, angle_sigma=BASELINE, latency_sigma=LATENCY_SIGMA
@@ -123,6 +124,7 @@ class VelocityLog(_Mounted):
     ----------
     record : VelocityRecord
     mounting : Mounting, optional
+        Left out, the arm (15 m) is estimated.
     errors : LogErrors or {"reference", "em", "doppler-water", "doppler-bottom"}, optional
         Its slow errors; left out, those that are usual for a log in its axes: body axes, one in the water. ``LogErrors()``: none
         but those of the mounting.
@@ -131,6 +133,7 @@ class VelocityLog(_Mounted):
     record: VelocityRecord
     errors: LogErrors | str | None = None
     key: ClassVar[str] = "velocity"
+    usual: ClassVar[Mounting] = Mounting(lever_arm_sigma=HULL)
 
     @property
     def unsaid(self) -> list[Evidence]:

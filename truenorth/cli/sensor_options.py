@@ -146,10 +146,12 @@ class Sensors:
         return replace(found or WHEEL, **given(self, "wheel"))
 
     def log(self) -> Mounting:
-        """Of a velocity log; its scale and its angles have errors of their own."""
+        """Of a velocity log; its scale and its angles have errors of their own, and an arm that is not said is estimated."""
+        from truenorth.aiding.aids import HULL
         from truenorth.state.mounting import Mounting
 
-        return replace(Mounting(), **(given(self, "wheel") | {"lever_arm_sigma": 0.0}))
+        sigma = HULL if self.wheel_arm is None else 0.0
+        return replace(Mounting(), **(given(self, "wheel") | {"lever_arm_sigma": sigma}))
 
     def log_errors(self, frame: str) -> LogErrors | None:
         """Of the velocity log: those of its kind, and what is given of them; None: nothing is said."""

@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.aids import HULL
 from truenorth.damping.course import motion_at
 from truenorth.damping.waves import SPAN, hann_means
 from truenorth.errors.log import DRIFT, LogErrors, log_rows
@@ -40,7 +41,6 @@ from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-HULL = 15.0  # m, one sigma: how far from the IMU a log may sit of which nothing is said
 CLEAR = 3.0  # sigmas: an arm that is named
 FEWEST = 30  # differences, below which none is sought
 LEAST_NOISE = 1e-4  # m/s

@@ -318,6 +318,15 @@ def moved(first: Track, other: Track) -> Effect:
     return _of_states(ratio * first.sigma[-1, :9])
 
 
+def effect_along(first: Track, other: Track) -> Effect:
+    """By how much two tracks differ at most, anywhere on the way: in sigmas of the first there, as sizes at its end."""
+    off = np.abs(first.errors_against(other, nearest(other.time, first.time)))
+    sigma = first.sigma[:, :9]
+    known = sigma > 0.0
+    ratio = np.where(known, off / np.where(known, sigma, 1.0), 0.0).max(axis=0)
+    return _of_states(ratio * first.sigma[-1, :9])
+
+
 def nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
     """Rows of ascending times that lie nearest to those wanted."""
     after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)

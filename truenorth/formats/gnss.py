@@ -15,6 +15,7 @@ from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
 from truenorth.formats.phone import PHONE, accuracies, speed_and_bearing
 from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Quantity
+from truenorth.formats.stale import without_stale
 from truenorth.formats.zipped import of_folder, unpacked
 from truenorth.records import GnssRecord
 
@@ -88,7 +89,8 @@ def read_gnss(
     ones the correlation between the axes is not known and taken as none); ``hdop, vdop, quality``. Of two antennas ``heading`` with
     ``sigma_heading`` (without it, it may be the course, and is used only where `columns` names it), or their ``baseline_E,
     baseline_N, baseline_U``. Empty cells are absent values; a standard deviation of zero is an unknown one. Rows of quality 0 (no
-    fix) lose their position and velocity.
+    fix) lose their position and velocity. A fix that is written again while the vehicle goes on, by a receiver that hangs or a
+    logger that is faster, is left out.
 
     Parameters
     ----------
@@ -115,7 +117,7 @@ def read_gnss(
     try:
         by_content = format is None and path.is_file() and (path.suffix.lower() in NMEA_SUFFIXES or is_nmea(path))
         if format == "nmea" or by_content:
-            return read_nmea(path)
+            return without_stale(read_nmea(path))
     except OSError as error:
         raise unreadable(path, error) from None
     given = {"columns": columns, "units": units, "topic": topic}
@@ -136,7 +138,8 @@ def read_gnss(
     values.setdefault("position_sigma", known(_or(found.stack("sigma_E", "sigma_N", "sigma_U"), of_place)))
     values.setdefault("velocity_sigma", known(_or(found.stack("sigma_VE", "sigma_VN", "sigma_VU"), of_velocity)))
     dop = known(found.stack("hdop", "vdop"))
-    return made(found, GnssRecord, **values, dop=dop, quality=found.values.get("quality"))
+    record: GnssRecord = made(found, GnssRecord, **values, dop=dop, quality=found.values.get("quality"))
+    return without_stale(record)
 
 
 def _or(first: Array | None, second: Array | None) -> Array | None:

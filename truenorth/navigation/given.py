@@ -144,9 +144,22 @@ def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitud
         return "gnss", []
     if "baro" in given:
         return "baro", []
-    if given.keys() - {"gnss", Fixes.key}:
+    if _shows_climb(given):
         return "free", [note("height.free")]
     return "fixed", [note("height.fixed", "height_sensor")]
+
+
+def _shows_climb(given: Mapping[str, Aid]) -> bool:
+    """Whether an aid shows the vertical velocity.
+
+    A receiver's velocities do with their component up, and so does a log. Of a log along the hull's level axes alone, height left
+    free would grow e-fold in 9.5 minutes: by hundreds of metres on ships, and with it all else.
+    """
+    gnss, log = record_of(given, Gnss), record_of(given, VelocityLog)
+    rows = [None if gnss is None else gnss.v_n, None if log is None else log.velocity]
+    if any(v is not None and np.isfinite(v[:, 2]).any() for v in rows):
+        return True
+    return bool(given.keys() - {Gnss.key, VelocityLog.key, Fixes.key})
 
 
 def turns_velocity(altitude: Altitude) -> bool:

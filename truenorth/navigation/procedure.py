@@ -21,6 +21,7 @@ from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.height_drift import height_evidence
+from truenorth.estimate.height_step import height_step_evidence
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
@@ -333,7 +334,7 @@ def _rivals(
 
 
 def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:
-    """Whether the receiver's velocity steps where the IMU's does not, or its heights drift away from it."""
+    """Whether the receiver's velocity steps where the IMU's does not, or its heights step or drift away from it."""
     receiver = given.get(Gnss.key)
     if not isinstance(receiver, Gnss):
         return []
@@ -344,7 +345,10 @@ def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) 
 
     usual, without = partial(with_log, plan.slow), [partial(with_log, less) for less in one_less(plan.slow)]
     found = led_by_evidence(usual, track, receiver.record, without)
-    return found if plan.altitude == "fixed" else found + height_evidence(usual, track, receiver.record, without)
+    if plan.altitude == "fixed":
+        return found
+    stepped = height_step_evidence(usual, track, receiver.record, without)
+    return found + (stepped or height_evidence(usual, track, receiver.record, without))
 
 
 def _intervals(

@@ -40,6 +40,8 @@ class GnssRecord(Record):
         Of the line from the first to a second antenna, clockwise from true north.
     heading_sigma : (N,) array or None, rad
     source : str
+    stale : int
+        Rows whose fix a reader left out, since it was the one before, written again on the move.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class GnssRecord(Record):
     heading: Array | None = None
     heading_sigma: Array | None = None
     source: str = field(default="GNSS record", compare=False)
+    stale: int = field(default=0, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -81,6 +84,17 @@ class GnssRecord(Record):
         check_range(self, "heading", -2 * math.pi, 2 * math.pi, "headings are in radians here: were degrees handed in?")
         if not (self.has_position.any() or self.has_velocity.any() or self.has_heading.any()):
             raise DataError(f"{self.source}: neither a position nor a velocity in any row; expected some fixes")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was put right when the log was read, in words."""
+        if not self.stale:
+            return super().notes
+        were = "1 fix is" if self.stale == 1 else f"{self.stale} fixes are"
+        return (
+            *super().notes,
+            f"{self.source}: {were} the one before, written again while the vehicle went on: left out",
+        )
 
     @property
     def has_position(self) -> NDArray[np.bool_]:

@@ -196,6 +196,10 @@ OF_SENSORS = {
     ),
     "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
     "gnss.height_drifts": "the GNSS heights drift by {size:.2g} m against the velocities, {rate:+.2g} m/s (ratio {ratio:.0f})",
+    "gnss.height_steps": (
+        "the GNSS heights step by {size:+.2g} m at {time:.0f} s, and the velocities do not (ratio {ratio:.0f}): another datum, "
+        "geoid or reference station from there on?"
+    ),
     "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
     "master.turned": (
         "the master's velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"

@@ -1,0 +1,89 @@
+"""Fixes that are written again while the vehicle goes on are no measurements; those of a vehicle that stands are."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import truenorth
+from truenorth.records import GnssRecord
+
+Array = NDArray[np.float64]
+LAT, LON = 48.0, 11.0
+
+
+def log(path: Path, time: Array, north: Array, speed: Array | None = None, digits: int = 9) -> GnssRecord:
+    """Fixes `north` (m) of a place, as a receiver writes them, with their speed."""
+    lines = ["time,lat,lon,alt" + ("" if speed is None else ",VE,VN,VU")]
+    for k, (t, away) in enumerate(zip(time, north, strict=True)):
+        row = f"{t:.2f},{LAT + away / 111_200.0:.{digits}f},{LON:.{digits}f},500.0"
+        lines.append(row + ("" if speed is None else f",0.0,{speed[k]:.3f},0.0"))
+    (path / "gnss.csv").write_text("\n".join(lines) + "\n")
+    return truenorth.read_gnss(path / "gnss.csv")
+
+
+def driven(scatter: float = 0.5) -> tuple[Array, Array, Array]:
+    """100 s: 30 s at rest, then 12 m/s; time, way, speed."""
+    time = np.arange(100.0)
+    speed = np.where(time > 30.0, 12.0, 0.0)
+    rng = np.random.default_rng(5)
+    return time, np.cumsum(speed) + rng.normal(0.0, scatter, 100), speed + rng.normal(0.0, 0.05, 100)
+
+
+@pytest.mark.parametrize("with_speed", [True, False])
+def test_a_receiver_that_hangs(tmp_path: Path, with_speed: bool) -> None:
+    time, north, speed = driven()
+    north[50:62], speed[50:62] = north[49], speed[49]
+    record = log(tmp_path, time, north, speed if with_speed else None)
+    assert record.stale == 12
+    assert len(record) == 88
+    assert not np.isin(record.time, time[50:62]).any()
+    assert "12 fixes are the one before" in " ".join(record.notes)
+
+
+def test_one_that_hangs_at_rest_and_wakes_far_away(tmp_path: Path) -> None:
+    time, north, speed = driven()
+    north[20:45], speed[20:45] = north[19], 0.0
+    speed[19] = 0.0
+    record = log(tmp_path, time, north, speed)
+    assert record.stale == 25
+    assert len(record) == 75
+
+
+@pytest.mark.parametrize("with_speed", [True, False])
+def test_a_logger_that_is_faster_than_the_receiver(tmp_path: Path, with_speed: bool) -> None:
+    time, north, speed = driven()
+    moving = slice(31, None)
+    often = time[moving][:, None] + 0.1 * np.arange(10)
+    held = [np.repeat(a[moving], 10) for a in (north, speed)]
+    record = log(tmp_path, often.ravel(), held[0], held[1] if with_speed else None)
+    np.testing.assert_allclose(record.time[record.time < 99.0], time[moving][:-1])
+
+
+def test_velocities_of_their_own_stay(tmp_path: Path) -> None:
+    time, north, speed = driven()
+    north[50:62] = north[49]  # the places hang, the velocities do not
+    record = log(tmp_path, time, north, speed)
+    assert record.stale == 12
+    assert len(record) == 100
+    assert record.has_velocity.all()
+    assert np.count_nonzero(record.has_position) == 88
+
+
+@pytest.mark.parametrize("with_speed", [True, False])
+def test_a_fix_that_is_held_at_rest_stays(tmp_path: Path, with_speed: bool) -> None:
+    time, north, speed = driven(scatter=0.0)
+    north[:31], speed[:31] = 0.0, 0.0
+    brakes = np.clip((north - north[80]) / 40.0, 0.0, None)
+    north -= 40.0 * (brakes - 1.0 + np.exp(-brakes)) * (time > 80)  # comes to a stop
+    record = log(tmp_path, time, north, speed if with_speed else None)
+    assert record.stale == 0
+    assert len(record) == 100
+
+
+def test_places_of_few_digits_stay(tmp_path: Path) -> None:
+    time, north, speed = driven()
+    slow = log(tmp_path, time, north / 30.0, speed / 30.0, digits=5)  # 0.4 m/s by steps of 1.1 m
+    assert np.count_nonzero(np.diff(slow.lat) == 0.0) > 20
+    assert slow.stale == 0
