@@ -18,10 +18,8 @@ from truenorth.records import ImuRecord
 Array = NDArray[np.float64]
 
 LAST = 60  # s
-SMOOTHEST, SMOOTH = (
-    1,
-    3,
-)  # degrees of the curve of velocity: of a short log by a tilt alone, of a minute by one that bends
+# Degrees of the curve of velocity: of a short log by a tilt alone, of a minute by one that bends.
+SMOOTHEST, SMOOTH = 1, 3
 A_DEGREE = 15.0  # s of log for one degree
 FEWEST = 5  # s
 CHANCE = 3.0  # standard deviations of a sum of squares
@@ -91,12 +89,13 @@ def _own(left: Array, noise: Array, swell: Array, degree: int) -> float:
     By chance the velocities, each as well as noise lets it be known, have as large a square as they are many. `swell`, of an RMS
     of 1, tells what must be there to be seen.
     """
-    kept = left.size - degree - 1
+    kept, square, mean = left.size - degree - 1, float(left @ left), float(np.trace(noise))
+    if not mean:  # perfect sensors
+        return float(np.sqrt(square / kept))
     values, ways = np.linalg.eigh(noise)
     known = ways[:, -kept:] / np.sqrt(values[-kept:])
     needed = CHANCE * float(np.sqrt(2.0 * kept))
     hidden = 0.5 * float(np.sqrt(needed / np.sum((known.T @ swell) ** 2)))
     if float(np.sum((known.T @ left) ** 2)) <= kept + needed:
         return hidden
-    square, mean = float(left @ left), float(np.trace(noise))
     return max(float(np.sqrt(max(square - mean, 0.0) / kept)), 2.0 * hidden)
