@@ -7,6 +7,9 @@ kilometres, and what is left of ``z - H x`` is the product of such errors: north
 their sigmas away from what the receiver measured. So innovations are what the rows say of the motion with its known errors
 taken off, exactly.
 
+That is so once the attitude is known. Of a heading that is any, errors swing by a radian within the first fixes, and end where they
+end in a filter that is linear throughout; exact innovations of such an attitude mean nothing, and a gate keeps out good fixes.
+
 Source: G. Huang, A. Mourikis and S. Roumeliotis, "Analysis and improvement of the consistency of extended Kalman filter based
 SLAM", ICRA 2008: Jacobians at first estimates, residuals at the last ones.
 """
@@ -22,6 +25,14 @@ from truenorth.estimate.memory import Events, Memory, Model, Samples, Sources
 from truenorth.estimate.predict import describe, describe_instant
 from truenorth.state.now import NOW_BEHIND
 from truenorth.strapdown.wander import set_matrix
+
+NEAR = 0.1  # rad, one sigma of an attitude: half of its square is what the linear rows leave out
+
+
+@borrowing(forceinline=True)
+def is_exact(model: Model, P: Any) -> bool:
+    """Whether innovations are what rows say with the known errors taken off; by the covariance P (n, n)."""
+    return model.exact and P[0, 0] < NEAR**2 and P[1, 1] < NEAR**2 and P[2, 2] < NEAR**2
 
 
 @borrowing(forceinline=True)

@@ -20,7 +20,7 @@ from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
 from truenorth.errors.invariant import keep_reset, reset
-from truenorth.estimate.apart import innovations_there
+from truenorth.estimate.apart import innovations_there, is_exact
 from truenorth.estimate.correct import (
     damp_height,
     feed_back,
@@ -104,11 +104,12 @@ def correct(
         if not np.isnan(w.z[0]):
             set_place(size, m, now, R, w)
         return SOUND
+    exact = is_exact(model, w.P)
     for a in range(3):
         w.R[a, a] = R[a]
         if np.isnan(events.variance[k, a]):
             w.z[a] = np.nan
-        elif model.exact:
+        elif exact:
             w.z[a] = room.z[a]
         elif model.opened:
             for b in range(len(m.x)):
@@ -309,7 +310,7 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
                 since = 0.0
                 if retimed:
                     since = here - late.time[r]
-                if model.exact:
+                if is_exact(model, w.P):
                     innovations_there(m, model, sources, of, e, samples, i, since, w, room)
                 describe(m, model, now)
                 now[NOW_BEHIND] = since
