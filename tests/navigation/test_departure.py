@@ -141,14 +141,6 @@ def test_a_ship_that_departs_in_a_seaway_leaves():
     assert (_off(start, motion) < 4.0).all()
 
 
-def test_an_even_push_from_the_first_seconds_on_is_refused():
-    """It looks like a tilt, but for the seconds before; the start was 3600 of its sigmas off."""
-    legs = [*straight(1.0), *accelerate(12.0, 0.05, 0.0, 5.0), *straight(60.0)]
-    log = simulate(course(PLACE, legs, heading=HEADING), rate=50.0, duration=90.0, imu="industrial", seed=5).record
-    with pytest.raises(AlignmentError, match="the vehicle moves within the first"):
-        tn.known_start(log, PLACE, "industrial", HEADING, SIGMA)
-
-
 @pytest.mark.parametrize(("still", "acceleration"), [(1.0, 0.3), (3.0, 0.05), (5.0, 0.6)])
 def test_one_that_departs_before_it_is_seen_to_stay_is_refused(still, acceleration):
     """Its start was taken at 10 s, with a velocity up to 41 of its sigmas off."""

@@ -9,8 +9,8 @@ the gyros into axes that do not turn, in which no tilt looks like a push; a depa
 the same way.
 
 A base that swings three times within a minute, and goes nowhere by the first half of it nor, backwards, by the second, has not
-departed. Where nothing departs so, means of half a minute show one that departs in waves, and backwards the first seconds show
-one that has gained speed evenly since.
+departed. It was not calm before: what was, and then goes to and fro, has left. Where nothing departs so, means of half a minute
+show one that departs in waves.
 """
 
 from __future__ import annotations
@@ -64,8 +64,6 @@ def departure(record: ImuRecord) -> Departure | None:
     if found is None and len(motion.time) >= WAVES:
         noise = white_noise(record)
         first, found = WAVE - 1, _found(seen.smooth(float(np.max(noise[3:])), float(np.max(noise[:3]))), sways)
-    if found is None and _had_left(seen, sways):
-        found = SHORTEST, 0
     if found is None:
         return None
     span, calm = found
@@ -126,21 +124,10 @@ def _found(seen: _Seen, sways: bool) -> tuple[int, int] | None:
         if share <= 1.0 or (sways and min(shares[k : 2 * max(calm, SHORTEST) - SHORTEST + 1]) <= GONE):
             continue
         longer = range(span + 1, min(seconds, max(2 * calm, WAVES)) + 1)
-        if not any(seen.first(n).to_and_fro() for n in longer):
+        # What was calm, and then goes to and fro, has left: a forklift that shuttles. Waves are there from the first second on.
+        if calm or not any(seen.first(n).to_and_fro() for n in longer):
             return span, calm
     return None
-
-
-def _had_left(seen: _Seen, sways: bool) -> bool:
-    """Whether a base that goes on evenly had another force in its first seconds: it left before it was seen to stay."""
-    seconds = seen.turns.shape[1]
-    for span in range(SHORTEST, min(seconds, WAVES) + 1):
-        first = seen.first(span)
-        if first.backwards().plain() <= 1.0 or sways:
-            continue
-        if not any(seen.first(n).to_and_fro() for n in range(span, min(seconds, WAVES) + 1)):
-            return True
-    return False
 
 
 def _smooth(rate: Array) -> Array:

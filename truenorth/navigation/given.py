@@ -149,6 +149,9 @@ def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitud
     return "fixed", [note("height.fixed", "height_sensor")]
 
 
+OF_ATTITUDE = ("attitude", "magnetometer")  # keys of aids that show no velocity
+
+
 def _shows_climb(given: Mapping[str, Aid]) -> bool:
     """Whether an aid shows the vertical velocity.
 
@@ -159,7 +162,7 @@ def _shows_climb(given: Mapping[str, Aid]) -> bool:
     rows = [None if gnss is None else gnss.v_n, None if log is None else log.velocity]
     if any(v is not None and np.isfinite(v[:, 2]).any() for v in rows):
         return True
-    return bool(given.keys() - {Gnss.key, VelocityLog.key, Fixes.key})
+    return bool(given.keys() - {Gnss.key, VelocityLog.key, Fixes.key, *OF_ATTITUDE})
 
 
 def turns_velocity(altitude: Altitude) -> bool:
