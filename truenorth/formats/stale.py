@@ -26,6 +26,7 @@ LEAST_LEAP = 3.0  # m, to the fix after a run
 STEPS = 5.0  # of the resolution of the places, as either must be besides
 SLOWEST = 0.3  # m/s: a receiver at rest may say so much
 FEWEST = 10  # places, of a log of which this can be said
+USUAL = 0.5  # of the runs, as which none is a receiver that holds its fix
 FASTER = 3.0  # times the pace around, that the leap after a run would need
 
 
@@ -62,6 +63,11 @@ def without_stale(record: GnssRecord) -> GnssRecord:
     way, lasts = np.linalg.norm(ways[ends - 1] - ways[starts], axis=1), time[ends - 1] - time[starts]
     gone_on = (way > max(LEAST_WAY, STEPS * fine)) & (way > SLOWEST * lasts)
     gone_on |= (leap > max(LEAST_LEAP, STEPS * fine)) & (leap > FASTER * pace * within)
+    repeats = ends - starts > 1
+    if (
+        np.mean(gone_on[repeats]) > USUAL
+    ):  # a logger faster than its receiver: what it writes again at walking pace is no fix either
+        gone_on = repeats
     again = np.repeat(gone_on, ends - starts)
     again[starts] = False
     if not again.any():
