@@ -66,7 +66,7 @@ def without_stale(record: GnssRecord) -> GnssRecord:
     repeats = ends - starts > 1
     if (
         np.mean(gone_on[repeats]) > USUAL
-    ):  # a logger faster than its receiver: what it writes again at walking pace is no fix either
+    ):  # a logger faster than its receiver: what it writes again slowly is no fix, either
         gone_on = repeats
     again = np.repeat(gone_on, ends - starts)
     again[starts] = False
