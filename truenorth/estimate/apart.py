@@ -48,7 +48,7 @@ def innovations_there(
     w: Any,
     room: Any,
 ) -> None:
-    """Put into `room.z` (3,) what measurement e is off by, the known errors taken off; all else stays as it is.
+    """Put into `room.z` (3,) what measurement e is off by, the known errors taken off; the motion stays as it is.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def innovations_there(
     behind : float, s
         How long ago the stamp was.
     room : Room
-        Of the loop: `there` is made room for by it.
+        Of the loop. All but `z` is written over, as what `w` holds of a measurement is.
     """
     source, s, aux, x, force = events.source[e], m.s, m.aux, m.x, m.means.vectors[0]
     for a in range(len(s)):

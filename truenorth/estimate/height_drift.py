@@ -19,8 +19,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from truenorth.core.errors import DataError
-from truenorth.estimate.responses import likeliest, signatures_of
-from truenorth.estimate.rivals import likelihood_ratio, moved
+from truenorth.estimate.responses import likeliest_of
+from truenorth.estimate.rivals import moved
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence, Figure
 from truenorth.state.limits import limit
@@ -54,15 +54,8 @@ def height_evidence(
     """
     if receiver.v_n is None:
         return []
-    found = (0.0, 0.0)
     try:
-        for less in (run, *without):
-            track = first if less is run else less(receiver)
-            before = 0.0 if less is run else min(likelihood_ratio(first.residuals, track.residuals), 0.0)
-            seen = signatures_of(track.residuals, [less(_level(receiver, STEP)).residuals], STEP)
-            ratio, size = likeliest(seen)
-            found = max(found, (ratio + before, float(size[0]) if ratio > 0.0 else 0.0))
-        ratio, rate = found
+        ratio, rate = likeliest_of((run, *without), first, receiver, _level, STEP)
         if ratio <= limit("height drift"):
             return []
         effect = moved(first, run(_level(receiver, rate)))

@@ -14,13 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.estimate.responses import likeliest, signatures_of
-from truenorth.estimate.rivals import effect_along, likelihood_ratio
+from truenorth.estimate.responses import likeliest_of
+from truenorth.estimate.rivals import effect_along
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence, Figure
 from truenorth.state.limits import limit
@@ -62,23 +63,17 @@ def height_step_evidence(
     if suspect is None:
         return []
     onset, shown = suspect
-    found = (0.0, 0.0)
+    before = partial(_before_step, onset)
     try:
-        for less in (run, *without):
-            track = first if less is run else less(receiver)
-            before = 0.0 if less is run else min(likelihood_ratio(first.residuals, track.residuals), 0.0)
-            seen = signatures_of(track.residuals, [less(_before_step(receiver, onset, STEP)).residuals], STEP)
-            ratio, size = likeliest(seen)
-            found = max(found, (ratio + before, float(size[0]) if ratio > 0.0 else 0.0))
-        ratio, size_m = found
+        ratio, size = likeliest_of((run, *without), first, receiver, before, STEP)
         if ratio <= 2.0 * math.log(len(receiver) / limit("step")):
             return []
         # Of a step whose rows the gates reject the innovations show a part alone.
-        size_m = max(size_m, shown, key=abs) if size_m * shown > 0.0 else size_m
-        effect = effect_along(first, run(_before_step(receiver, onset, size_m)))
+        size = max(size, shown, key=abs) if size * shown > 0.0 else size
+        effect = effect_along(first, run(before(receiver, size)))
     except DataError:  # the filter broke down: no explanation
         return []
-    figures: dict[str, Figure] = {"size": size_m, "time": onset, "ratio": ratio}
+    figures: dict[str, Figure] = {"size": size, "time": onset, "ratio": ratio}
     return [Evidence("gnss.height_steps", figures, "hint", effect)]
 
 
@@ -102,6 +97,6 @@ def likely_step(receiver: GnssRecord) -> tuple[float, float] | None:
     return float(time[SIDE + largest]), float(steps[largest])
 
 
-def _before_step(receiver: GnssRecord, onset: float, size: float) -> GnssRecord:
+def _before_step(onset: float, receiver: GnssRecord, size: float) -> GnssRecord:
     """The receiver as it would be without heights that are larger by `size` (m) from a moment on."""
     return replace(receiver, alt=receiver.alt - size * (receiver.time >= onset))

@@ -94,8 +94,12 @@ def correct(
     room: Room,
     kept: Kept,
     link: int,
+    exact: bool,
 ) -> int:
-    """Take event k, a measurement; `number` is its place in the histories. The failure, if any."""
+    """Take event k, a measurement; `number` is its place in the histories. The failure, if any.
+
+    With `exact` its innovations are those of `room.z`.
+    """
     source, now, R = events.source[k], room.now, room.R
     for a in range(3):
         R[a] = events.variance[k, a]
@@ -104,7 +108,6 @@ def correct(
         if not np.isnan(w.z[0]):
             set_place(size, m, now, R, w)
         return SOUND
-    exact = is_exact(model, w.P)
     for a in range(3):
         w.R[a, a] = R[a]
         if np.isnan(events.variance[k, a]):
@@ -310,14 +313,15 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
                 since = 0.0
                 if retimed:
                     since = here - late.time[r]
-                if is_exact(model, w.P):
+                exact = is_exact(model, w.P)
+                if exact:
                     innovations_there(m, model, sources, of, e, samples, i, since, w, room)
                 describe(m, model, now)
                 now[NOW_BEHIND] = since
                 if sources.instant[source]:
                     describe_instant(samples, i, m.done[0], model, m.aux, now)
                 failure = correct(
-                    size, m, model, sources, of, e, number, here if retimed else time, w, room, kept, link
+                    size, m, model, sources, of, e, number, here if retimed else time, w, room, kept, link, exact
                 )
                 if failure != SOUND:
                     break

@@ -11,15 +11,17 @@ systems", IEEE Trans. Autom. Control 21 (1976); signatures by passes of the filt
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.quality.led_away import no_outlier
 from truenorth.quality.whiteness import whiteness
-from truenorth.state.track import Residuals
+from truenorth.records import GnssRecord
+from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
@@ -76,6 +78,42 @@ def signatures_of(first: Sequence[Residuals], passes: Sequence[Sequence[Residual
     """
     found = [_signature(r, [_same(r, others) for others in passes], step) for r in first]
     return [item for item in found if item is not None]
+
+
+def likeliest_of(
+    runs: Sequence[Callable[[GnssRecord], Track]],
+    first: Track,
+    receiver: GnssRecord,
+    without: Callable[[GnssRecord, float], GnssRecord],
+    step: float,
+) -> tuple[float, float]:
+    """Twice the logarithm of the likelihood ratio of a change of a receiver's log, and its size; zeros where none shows.
+
+    Parameters
+    ----------
+    runs : sequence of callable
+        The filter with another record of the receiver; then the same, each without one of the slow errors that the innovations
+        have shown, since such an error takes up what may be a change.
+    first : Track
+        Of the first of these, with the record as it is.
+    receiver : GnssRecord
+    without : callable
+        The record as it would be without a change of this size.
+    step : float
+        Size of the change that a pass asks with.
+
+    Raises
+    ------
+    DataError
+        A filter broke down.
+    """
+    found = (0.0, 0.0)
+    for run in runs:
+        track = first if run is runs[0] else run(receiver)
+        before = min(likelihood_ratio(first.residuals, track.residuals), 0.0)
+        ratio, size = likeliest(signatures_of(track.residuals, [run(without(receiver, step)).residuals], step))
+        found = max(found, (ratio + before, float(size[0]) if ratio > 0.0 else 0.0))
+    return found
 
 
 def _same(source: Residuals, others: Sequence[Residuals]) -> Residuals | None:

@@ -21,6 +21,7 @@ from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 AIDS = (Gnss, Odometer, VelocityLog, Barometer)
+OF_ATTITUDE = ("attitude", "magnetometer")  # keys of aids that show no velocity
 
 
 def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
@@ -147,9 +148,6 @@ def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitud
     if _shows_climb(given):
         return "free", [note("height.free")]
     return "fixed", [note("height.fixed", "height_sensor")]
-
-
-OF_ATTITUDE = ("attitude", "magnetometer")  # keys of aids that show no velocity
 
 
 def _shows_climb(given: Mapping[str, Aid]) -> bool:

@@ -84,7 +84,10 @@ def with_heading(alignment: Alignment, heading: float, sigma: float) -> Alignmen
 
 
 def _turned_too(velocity: Array, turn: Array) -> Array:
-    """(3,) RMS velocities after a turn about the vertical: what they are at most, since how they go together is not known."""
+    """(3,) RMS velocities after a turn about the vertical: what they are at most, since how they go together is not known.
+
+    Of an answer by means, whose level ones are the largest of any direction already, that is up to 1.4 times as much as need be.
+    """
     east, north, up = velocity
     c, s = abs(float(turn[0, 0])), abs(float(turn[0, 1]))
     return np.array([c * east + s * north, s * east + c * north, up])

@@ -182,7 +182,7 @@ def _quick(record: ImuRecord, time: Array) -> tuple[Array, Array]:
 
     Two means of two such times each: .4 of what comes each fourth of them is slow, nothing each second, less than .05 beyond.
     """
-    return _quick_at(record, time.tobytes())
+    return _quick_at(record, np.asarray(time, dtype=np.float64).tobytes())
 
 
 @remembered

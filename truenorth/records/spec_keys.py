@@ -62,6 +62,7 @@ class Entry:
     def holds(self, value: float, times: float = 1.0) -> bool:
         """Whether a sensor can have a value, or one so many times as large."""
         low, high = self.bounds
+        # A least above zero is so many times less; one below zero, as of a temperature, stays.
         return min(low, low / times) <= value and value / times <= high
 
     def allows(self, value: float) -> bool:
