@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import truenorth
+from truenorth.formats.stale import without_stale
 from truenorth.records import GnssRecord
 
 Array = NDArray[np.float64]
@@ -87,3 +88,53 @@ def test_places_of_few_digits_stay(tmp_path: Path) -> None:
     slow = log(tmp_path, time, north / 30.0, speed / 30.0, digits=5)  # 0.4 m/s by steps of 1.1 m
     assert np.count_nonzero(np.diff(slow.lat) == 0.0) > 20
     assert slow.stale == 0
+
+
+@pytest.mark.parametrize("with_speed", [True, False])
+def test_a_logger_of_a_walker_and_of_a_rest(tmp_path: Path, with_speed: bool) -> None:
+    """A second of a walk is no way that stands out, and a rest none at all: most places come again, so each repeat is a copy."""
+    time, north, speed = driven()
+    often = (time[:, None] + 0.1 * np.arange(10)).ravel()
+    held = [np.repeat(a, 10) for a in (north / 10.0, speed / 10.0)]
+    record = log(tmp_path, often, held[0], held[1] if with_speed else None)
+    np.testing.assert_allclose(record.time, time)
+
+
+def test_places_of_any_unit_with_few_digits_stay() -> None:
+    """Arc seconds by tenths: 3 m along north, 2 m along east; a walker makes several rows of each."""
+    time, tenth = np.arange(0.0, 300.0, 0.2), np.radians(0.1 / 3600.0)
+    lat = np.radians(LAT) + tenth * np.round(1.2 * time / 3.09)
+    record = GnssRecord(time, lat, np.full(1500, np.radians(LON)), np.full(1500, 500.0))
+    assert without_stale(record) is record
+
+
+def test_a_receiver_that_lets_go_of_its_fix_at_rest_stays() -> None:
+    time = np.arange(1000.0)
+    place = np.radians(LAT) + 4.0 / 6.37e6 * (time // 30.0 % 2.0)
+    speeds = np.random.default_rng(4).normal(0.0, 0.02, (1000, 3))
+    record = GnssRecord(time, place, np.full(1000, np.radians(LON)), np.full(1000, 500.0), speeds)
+    assert without_stale(record) is record
+
+
+def test_a_rest_before_a_gap_stays() -> None:
+    time = np.concatenate([np.arange(40.0), 100.0 + np.arange(60.0)])
+    away = np.where(time < 50.0, 0.0, 800.0 + 10.0 * (time - 100.0))
+    record = GnssRecord(time, np.radians(LAT) + away / 6.37e6, np.full(100, np.radians(LON)), np.full(100, 500.0))
+    assert without_stale(record) is record
+
+
+def test_headings_of_a_receiver_that_hangs_are_left_out_too() -> None:
+    time, north, speed = driven()
+    north[50:62], speed[50:62] = north[49], speed[49]
+    heading = np.random.default_rng(2).normal(0.0, 0.003, 100)
+    heading[50:62] = heading[49]
+    level = np.column_stack([0.0 * speed, speed, 0.0 * speed])
+    record = GnssRecord(
+        time,
+        np.radians(LAT) + north / 6.37e6,
+        np.full(100, np.radians(LON)),
+        np.full(100, 500.0),
+        level,
+        heading=heading,
+    )
+    assert len(without_stale(record)) == 88

@@ -1,6 +1,7 @@
 """A start at rest ends before the vehicle departs, however gently; a base that sways in the sea is at rest."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -150,3 +151,24 @@ def test_one_that_departs_before_it_is_seen_to_stay_is_refused(still, accelerati
     log = simulate(motion, rate=50.0, duration=90.0, imu="tactical", seed=5).record
     with pytest.raises(AlignmentError, match="the vehicle moves within the first"):
         tn.known_start(log, PLACE, "tactical", HEADING, SIGMA)
+
+
+@pytest.mark.parametrize("imu", ["tactical", "industrial"])
+def test_a_base_that_rests_and_then_shuttles_has_left(imu):
+    """A forklift to and fro at 1 m/s: taken for a sway, its start was under way, 27 sigmas off."""
+    log = simulate(rest(PLACE, HEADING), rate=50.0, duration=120.0, imu=imu, seed=3).record
+    phase = np.where(log.time > 16.0, (log.time - 16.0) % 14.0, np.nan)  # there, a stop of a second, and back
+    pushes = sum(sign * ((phase >= at) & (phase < at + 2.0)) for at, sign in ((0, 1), (4, -1), (7, -1), (11, 1)))
+    scale = log.interval if log.kind == "increments" else 1.0
+    shuttled = replace(log, accel=log.accel + scale * 0.5 * np.outer(pushes, [0.0, 1.0, 0.0]))
+    start = tn.known_start(shuttled, PLACE, imu, HEADING, SIGMA)
+    assert start.time < 16.0
+    assert _off(start, rest(PLACE, HEADING)).max() < 4.0
+
+
+def test_accelerometers_that_settle_are_no_departure():
+    """By 2 mg within half a minute, of 8 mg that they may be off by: refused as a vehicle that had left."""
+    log = simulate(rest(PLACE, HEADING), rate=50.0, duration=120.0, imu="industrial", seed=1).record
+    scale = log.interval if log.kind == "increments" else 1.0
+    settles = 0.02 * np.exp(-log.time / 15.0)
+    assert departure(replace(log, accel=log.accel + scale * np.outer(settles, [1.0, 0.3, 0.2]))) is None

@@ -26,6 +26,13 @@ AIDS = {
 }
 
 
+def test_an_attitude_shows_no_climb():
+    """With a log of two axes height was left free: 19 km off in half an hour."""
+    log = AIDS["a log of two axes"][0]
+    for key in ("attitude", "magnetometer"):
+        assert kept_altitude(None, {log.key: log, key: log})[0] == "fixed"
+
+
 @pytest.mark.parametrize(("aid", "wanted"), AIDS.values(), ids=AIDS)
 def test_height_that_is_not_said(aid, wanted):
     altitude, said = kept_altitude(None, {aid.key: aid})

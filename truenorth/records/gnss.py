@@ -93,7 +93,7 @@ class GnssRecord(Record):
         were = "1 fix is" if self.stale == 1 else f"{self.stale} fixes are"
         return (
             *super().notes,
-            f"{self.source}: {were} the one before, written again while the vehicle went on: left out",
+            f"{self.source}: {were} the one before, written again: left out",
         )
 
     @property
