@@ -16,7 +16,7 @@ show one that departs in waves.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +38,9 @@ BACK = 2.4  # times from there to where it is plain: of a push that grows, half 
 SHORTEST = 10  # s: two halves of five
 WAVES = 60  # s: in the halves of it any sea has more than a wave
 WAVE = 15  # s
+LEFT = (10.0 / (math.pi * WAVE)) ** 2  # of waves of 10 s, at most, by means of twice that
 FEWEST_SWINGS = 6  # from one side to the other: three waves
+RESTS = 0.2  # of what a base gains: as little as this it may gain at rest
 ASIDE = 0.5  # of the RMS: a swing goes as far
 
 
@@ -63,7 +65,10 @@ def departure(record: ImuRecord) -> Departure | None:
     first, found = 0, _found(seen, sways)
     if found is None and len(motion.time) >= WAVES:
         noise = white_noise(record)
-        first, found = WAVE - 1, _found(seen.smooth(float(np.max(noise[3:])), float(np.max(noise[:3]))), sways)
+        first, found = (
+            WAVE - 1,
+            _found(seen.smooth(float(np.max(noise[3:])), float(np.max(noise[:3]))), sways),
+        )
     if found is None:
         return None
     span, calm = found
@@ -75,33 +80,38 @@ def departure(record: ImuRecord) -> Departure | None:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Second by second, the level specific force (3, m) in two sets of axes, and the turns; noise beyond what it wanders by."""
+    """Second by second, the level specific force (3, m) in two sets of axes, and the turns; what noise and waves leave of them."""
 
     forces: tuple[Array, Array]
     turns: Array
     force_walk: float = 0.0  # m/s/sqrt(s)
     turn_walk: float = 0.0  # rad/sqrt(s)
+    waves: tuple[float, float] = (0.0, 0.0)  # m/s, rad
 
     def first(self, span: int) -> _Seen:
         """Of the first seconds."""
         a, b = self.forces
-        return _Seen((a[:, :span], b[:, :span]), self.turns[:, :span], self.force_walk, self.turn_walk)
+        return replace(self, forces=(a[:, :span], b[:, :span]), turns=self.turns[:, :span])
 
     def backwards(self) -> _Seen:
         """The last second first."""
         a, b = self.forces
-        return _Seen((a[:, ::-1], b[:, ::-1]), self.turns[:, ::-1], self.force_walk, self.turn_walk)
+        return replace(self, forces=(a[:, ::-1], b[:, ::-1]), turns=self.turns[:, ::-1])
 
     def smooth(self, force_walk: float, turn_walk: float) -> _Seen:
-        """In which there are no waves: means of half a minute, the middle of which counts most."""
+        """In which there are hardly any waves: means of half a minute, the middle of which counts most."""
         a, b = self.forces
-        return _Seen((_smooth(a), _smooth(b)), _smooth(self.turns), force_walk, turn_walk)
+
+        def left(rate: Array) -> float:
+            return LEFT * float(np.sqrt(np.mean(_gained(rate) ** 2)))
+
+        return _Seen((_smooth(a), _smooth(b)), _smooth(self.turns), force_walk, turn_walk, (left(a), left(self.turns)))
 
     def plain(self) -> float:
         """How plain a departure is, as a share of what is enough."""
         walks = BY_NOISE * math.sqrt(0.5 * self.turns.shape[1])
-        moved = min(_share(force, LEAST_GAIN + walks * self.force_walk) for force in self.forces)
-        return max(moved, _share(self.turns, LEAST_TURN + walks * self.turn_walk))
+        moved = min(_share(force, LEAST_GAIN + walks * self.force_walk + self.waves[0]) for force in self.forces)
+        return max(moved, _share(self.turns, LEAST_TURN + walks * self.turn_walk + self.waves[1]))
 
     def to_and_fro(self) -> bool:
         """Whether a base swings, and goes nowhere: by its first half and, backwards, by its second.
@@ -110,6 +120,19 @@ class _Seen:
         """
         swings = max(map(_swings, self.forces)) >= FEWEST_SWINGS
         return swings and self.plain() <= GONE and self.backwards().plain() <= GONE
+
+    def rests(self, calm: int) -> bool:
+        """Whether so many first seconds gain next to nothing of what the base gains in all: what then goes to and fro, has left.
+
+        A forklift shuttles so, after a rest. Waves are there from the first second on.
+        """
+        gains = (
+            (float(_gained(force).max()) for force in (self.forces[0][:, :calm], self.forces[0]))
+            if calm
+            else (1.0, 0.0)
+        )
+        before, whole = gains
+        return before < RESTS * whole
 
 
 def _found(seen: _Seen, sways: bool) -> tuple[int, int] | None:
@@ -124,8 +147,7 @@ def _found(seen: _Seen, sways: bool) -> tuple[int, int] | None:
         if share <= 1.0 or (sways and min(shares[k : 2 * max(calm, SHORTEST) - SHORTEST + 1]) <= GONE):
             continue
         longer = range(span + 1, min(seconds, max(2 * calm, WAVES)) + 1)
-        # What was calm, and then goes to and fro, has left: a forklift that shuttles. Waves are there from the first second on.
-        if calm or not any(seen.first(n).to_and_fro() for n in longer):
+        if not any(seen.first(n).to_and_fro() and not seen.first(n).rests(calm) for n in longer):
             return span, calm
     return None
 
