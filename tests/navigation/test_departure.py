@@ -172,3 +172,14 @@ def test_accelerometers_that_settle_are_no_departure():
     scale = log.interval if log.kind == "increments" else 1.0
     settles = 0.02 * np.exp(-log.time / 15.0)
     assert departure(replace(log, accel=log.accel + scale * np.outer(settles, [1.0, 0.3, 0.2]))) is None
+
+
+def test_a_ship_that_sways_by_ten_degrees_has_not_departed():
+    """The ship of the demo: of her waves means of half a minute leave more than of noise."""
+    of = (("heading_tones", 5.0, 7.0, 1.05), ("pitch_tones", 7.0, 5.0, 0.79), ("roll_tones", 10.0, 6.0, 0.45))
+    turns = {name: (Tone(math.radians(size), period, phase),) for name, size, period, phase in of}
+    pushes = {"north_tones": (Tone(0.03, 6.0, 1.0),), "up_tones": (Tone(0.3, 8.0, 2.0),)}
+    ship = Sway(PLACE, heading=math.radians(330.0), **turns, **pushes)
+    log = simulate(ship, rate=25.0, duration=300.0, imu="navigation", seed=1).record
+    for begin in range(0, 180, 30):
+        assert departure(log.between(begin, begin + 120.0)) is None

@@ -126,13 +126,8 @@ class _Seen:
 
         A forklift shuttles so, after a rest. Waves are there from the first second on.
         """
-        gains = (
-            (float(_gained(force).max()) for force in (self.forces[0][:, :calm], self.forces[0]))
-            if calm
-            else (1.0, 0.0)
-        )
-        before, whole = gains
-        return before < RESTS * whole
+        force = self.forces[0]
+        return calm > 0 and bool(_gained(force[:, :calm]).max() < RESTS * _gained(force).max())
 
 
 def _found(seen: _Seen, sways: bool) -> tuple[int, int] | None:
