@@ -180,6 +180,6 @@ def test_a_ship_that_sways_by_ten_degrees_has_not_departed():
     turns = {name: (Tone(math.radians(size), period, phase),) for name, size, period, phase in of}
     pushes = {"north_tones": (Tone(0.03, 6.0, 1.0),), "up_tones": (Tone(0.3, 8.0, 2.0),)}
     ship = Sway(PLACE, heading=math.radians(330.0), **turns, **pushes)
-    log = simulate(ship, rate=25.0, duration=300.0, imu="navigation", seed=1).record
+    log = simulate(ship, rate=50.0, duration=300.0, imu="navigation", seed=1).record
     for begin in range(0, 180, 30):
         assert departure(log.between(begin, begin + 120.0)) is None
