@@ -64,6 +64,7 @@ def test_sigma_is_absolute_where_the_master_s_own_errors_are_given(logs):
     assert "sigma is absolute" in result.stdout
 
 
+@pytest.mark.slow
 def test_another_time_base_and_what_is_not_seen(logs, tmp_path):
     """A delay of more than an hour keeps the digits that its sigma has; what velocity does not see is not "as given"."""
     slave, master = logs

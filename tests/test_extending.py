@@ -97,6 +97,7 @@ def test_navigation_is_honest_with_it(drive, plugin, runs):
     assert inside(total, runs)
 
 
+@pytest.mark.slow
 @few_and_all(12, few=2)
 def test_alignment_on_the_move_is_honest_with_it(drive, plugin, runs):
     total = 0.0

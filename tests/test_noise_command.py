@@ -45,6 +45,7 @@ def test_white_noise_comes_back_and_stands_in_both_files(still, tmp_path, capsys
     assert (tmp_path / "noise" / "noise.svg").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_what_rest_does_not_show_is_not_zero(still, tmp_path, capsys):
     """The file of an IMU's noise names no bias: with zeros in it a log of the same IMU was inconsistent."""
     code, _ = run(capsys, "noise", still, "-o", tmp_path / "noise")

@@ -38,6 +38,7 @@ def test_one_position_is_what_an_alignment_says(navigation):
     )
 
 
+@pytest.mark.slow
 def test_two_positions_are_what_an_alignment_says(navigation):
     (axis,) = steps([(0, math.pi)], dwell=290.0, duration=599.0, rate=math.radians(10.0), start=(0.0,))
     table = Indexed(rest(PLACE), Indexer((Axis("z", axis),)))

@@ -82,6 +82,7 @@ def test_an_arm_that_sinks_as_its_base_tilts_is_no_delay(above):
     assert min(delay.ratio for delay in seen) > 25.0
 
 
+@pytest.mark.slow
 def test_delays_of_quiet_seas_are_as_uncertain_as_their_sigma_says():
     """Twenty seas with accelerometers so noisy that sigma is a good part of what is asked."""
     seas = [floating(100 + k, 0.1, noise=3e-3) for k in range(20)]

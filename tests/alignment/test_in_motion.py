@@ -161,6 +161,7 @@ def test_mounting_and_lever_arm_are_found():
     assert abs(answer.heading - answer.moving.vehicle_heading) > math.radians(1.0)
 
 
+@pytest.mark.slow
 def test_navigation_goes_on_from_it(ring, tmp_path):
     """Aligned over 300 s of driving, navigated to the end, from the result and from its folder, with the same odometer."""
     sim, odometer = logs(ring, 0)

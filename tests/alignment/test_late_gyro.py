@@ -42,7 +42,7 @@ def test_a_gyro_of_an_indexed_imu():
     assert found.figures["delay"] == pytest.approx(0.04, rel=0.1)
 
 
-@pytest.mark.parametrize("bench", ["swaying", "rotary"])
+@pytest.mark.parametrize("bench", some(["swaying"], ["rotary"]))
 @few_and_all(20, few=1)
 def test_sound_gyros_are_of_one_moment(bench, runs):
     """The limit is passed once in a million."""

@@ -66,6 +66,7 @@ def test_gyros_whose_axes_are_exchanged_miss_the_earths_rate(waiting) -> None:
     assert any(item.key == "rate.misses" for item in answer.evidence)
 
 
+@pytest.mark.slow
 def test_velocities_a_hundred_times_as_noisy_give_no_heading_that_is_not_there(waiting) -> None:
     """In cm/s by mistake: of the vehicle at rest only the noise grows; a real one was 65 deg off, 22 of its sigmas."""
     record, gnss, spec = waiting

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import truenorth as tn
+from tests.runs import some
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.navigation.stops import turned_in_stops
 from truenorth.records.specs import imu_spec
@@ -29,7 +30,7 @@ def shifted(record):
     return replace(record, gyro=record.gyro + (off * record.steps[:, None] if record.kind == "increments" else off))
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", some([0], [1]))
 def test_seconds_of_another_rate_are_those_after_the_change(seed):
     log, gnss = van(seed)
     assert turned_in_stops(log.record, None, gnss)[0].size == 0
@@ -54,6 +55,7 @@ def test_a_heading_that_such_a_change_turns_is_not_said_to_be_known():
     assert answer.status == "inconsistent" or abs(off) < 4.0 * answer.euler_sigma[0]
 
 
+@pytest.mark.slow
 def test_a_turn_on_the_spot_between_stops_is_no_change():
     """By 10 deg within 10 s while the van stands: its heading was called 79 deg uncertain, and the log was refused."""
     log, gnss = van(0)

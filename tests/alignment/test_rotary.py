@@ -80,6 +80,7 @@ def simulate_errors(ship):
     return np.asarray(given["gyro_bias"]), np.asarray(given["accel_bias"])
 
 
+@pytest.mark.slow
 def test_a_known_arm_gives_the_same(ship, answer):
     """The arm is shown by the sway itself; to know it changes nothing beyond a sigma."""
     aid = IndexerAid(ship.encoder, lever_arm=-ship.arm)  # from the IMU to the centre

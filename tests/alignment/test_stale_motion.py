@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.honesty.foreign_rows import indexed, moored
-from tests.runs import some
 from truenorth.alignment import motion_filter, rotary
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.errors.staying import PHI
@@ -63,7 +62,8 @@ def test_fits_have_an_end():
     assert filter_.count == motion_filter.MOST_FITS
 
 
-@pytest.mark.parametrize("run", some([0], [7]))
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [0, 7])
 def test_innovations_of_an_indexer_have_their_size(run, monkeypatch):
     """About windowed fits alone they had .42 and .59 of it: the motion of a ship was up to twenty times too large."""
     kept, made = [], rotary.answer_of

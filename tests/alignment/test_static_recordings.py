@@ -57,6 +57,7 @@ def test_every_method_on_the_laboratory_log_against_its_reference():
         assert abs(roll - given["roll"]) < 0.01, method
 
 
+@pytest.mark.slow
 def test_a_specification_from_the_allan_deviation_refuses_heading_with_figures():
     """The bias instability alone, two hundred times what a heading of 5 deg allows; the walk and it as the datasheet says."""
     record, position = recordings.static_adis16405()

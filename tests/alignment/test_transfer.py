@@ -140,6 +140,7 @@ def test_an_open_loop_does_not_depend_on_what_it_is_about(flight, ideal):
         np.testing.assert_allclose(first.sigma[k][seen], expected[j], rtol=0.02)
 
 
+@pytest.mark.slow
 @few_and_all(12, few=4)
 def test_sigmas_are_honest(flight, ideal, runs):
     """NEES of attitude, gyro bias, delay, arm: ten numbers a flight, false alarms 1 in 1000 on either side."""

@@ -90,6 +90,7 @@ def flat_allan(rng, size, rows):
     return total
 
 
+@pytest.mark.slow
 def test_instability_as_datasheets_mean_it_is_no_base_that_leaves():
     """Flat Allan deviations, of the navigation preset's size. Before, each log had a drift, with a ratio of 170 to 1620."""
     spec = imu_spec("navigation")

@@ -68,6 +68,7 @@ def test_the_mean_of_the_rows_of_F_is_the_change_of_velocity(linear):
     np.testing.assert_allclose(np.einsum("kij,kj->ki", H, middle), change, atol=0.003 * np.abs(change).max())
 
 
+@pytest.mark.slow
 def test_a_constant_reference_error_cancels(linear):
     """In filter 2 on the raw reference to rounding, on the smoothed one to 1 %; in filter 1 not at all."""
     truth, _, course = linear
@@ -135,6 +136,7 @@ def test_the_prior_is_that_of_the_navigation():
     np.testing.assert_allclose(carried / scale, expected / scale, atol=0.01)
 
 
+@pytest.mark.slow
 @few_and_all(30)
 def test_the_augmented_filter_is_honest(runs):
     """Errors, biases and log error drawn from what it is given; NEES of fifteen numbers a run in its 99.9 % band.

@@ -203,6 +203,7 @@ def test_a_log_that_cannot_be_this_ships(ship, method, factor):
     assert ship.navigate(Damper(method), log).status == "navigated"
 
 
+@pytest.mark.slow
 def test_a_switch_later_than_the_start(ship):
     result = ship.navigate(Damper("augmented", start=9000.0), ship.log())
     free = ship.navigate(Damper("none"))

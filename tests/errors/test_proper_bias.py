@@ -51,6 +51,7 @@ def drive(request: pytest.FixtureRequest) -> tuple[Simulation, tn.Gnss, Alignmen
     return driven, gnss, tn.align(driven.record.between(None, 100.0), imu="industrial", aid=gnss)
 
 
+@pytest.mark.slow
 def test_a_drive_states_the_bias_of_the_upward_accelerometer(drive: tuple[Simulation, tn.Gnss, Alignment]) -> None:
     driven, gnss, start = drive
     assert start.status == "aligned"

@@ -46,7 +46,7 @@ def off(track, motion, ppm):
 
 
 @pytest.mark.parametrize("grade", some(["industrial"], ["consumer", "tactical"]))
-@pytest.mark.parametrize("ppm", some([1e4, 0.0], [-1e4]))
+@pytest.mark.parametrize("ppm", some([0.0], [1e4, -1e4]))
 def test_a_ship_of_200_s_whose_clock_is_off_by_one_percent(grade, ppm):
     """It was 10 sigmas of place off in silence, for 4400 of its prior stood against what 200 s of a swell show."""
     record, start, gnss, motion, spec = sailed(grade, ppm, 1)

@@ -70,6 +70,7 @@ def test_noise_and_slow_errors_are_found_as_they_were_drawn():
     assert [item.figures["name"] for item in said] == [SPEEDS]  # of places it was said when they were seen
 
 
+@pytest.mark.slow
 def test_velocities_without_colour_get_none_that_matters():
     rng = np.random.default_rng(4)
     errors = {FIXES: coloured(rng, 0.4, 1.9, 60.0), SPEEDS: 0.08 * rng.standard_normal((ROWS, 3))}

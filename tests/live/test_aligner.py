@@ -45,6 +45,7 @@ def test_the_last_answer_is_that_of_the_whole_log_to_the_bit(record, chunk):
     assert found.status == whole.status == "aligned"
 
 
+@pytest.mark.slow
 def test_known_lags_are_taken_off_the_stamps(record):
     """As in the batch: the answer holds when the sensors felt what the last row says."""
     late = replace(imu_spec("navigation"), gyro_latency=0.004, accel_latency=0.004)

@@ -54,6 +54,7 @@ def session(logs, speed, **options):
     )
 
 
+@pytest.mark.slow
 def test_a_replayed_run_on_the_move_is_the_batch_to_the_bit(logs):
     found = session(logs, "max").run()
     record, gnss = tn.read_imu(logs / "log.csv"), tn.read_gnss(logs / "gnss.csv")

@@ -24,6 +24,7 @@ from truenorth.state.track import Residuals, Track
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
 
+@pytest.mark.slow
 def test_fixes_that_err_together(drive):
     """By 2.4 m east, 1.2 m north, 5 m up, of a receiver that says 1.5 and 3 m: no innovation shows it, sigma has it."""
     motion, record, start = drive

@@ -8,7 +8,6 @@ from benchmarks.honesty.driving import car
 from benchmarks.honesty.masts import DOUBTED, received, shaken
 from benchmarks.honesty.masts import carried as on_a_mast
 from tests.alignment.test_in_motion_moments import recorded
-from tests.runs import some
 from truenorth.aiding.aids import Gnss
 from truenorth.errors.deflection import Deflection
 from truenorth.navigation import Mounting, navigate
@@ -28,6 +27,7 @@ def carried(grade, seed, arm, mean, said, late=0.0, rate=1.0):
     return result, compared(result, log.motion, (40.0, 80.0, 120.0, 158.0))
 
 
+@pytest.mark.slow
 def test_a_known_arm_whose_swing_is_not_shown_keeps_the_track():
     """91 of 160 fixes were rejected, and the place was 22 sigmas off."""
     result, found = carried("industrial", 0, (0.3, -0.2, 2.0), 1.0, said=True)
@@ -52,7 +52,8 @@ def test_a_mast_that_swings_by_a_metre_a_second_shows_scale_and_axes_of_gyros(me
     assert max(np.abs(ratio).max() for ratio in found.ratios.values()) < 4.0
 
 
-@pytest.mark.parametrize("number", some([6], [3]))
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [6, 3])
 def test_a_mast_in_a_swell_whose_velocities_are_means_keeps_its_track(number):
     """A delay shows the swing of an earlier moment: without that 396 of 398 and 462 of 464 fixes were rejected."""
     found = on_a_mast("ship", True, "said")(501, number)

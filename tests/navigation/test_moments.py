@@ -52,7 +52,8 @@ def test_velocities_with_a_clock_of_their_own(drive):
     assert np.allclose(usual.time, TIMES - 0.1)
 
 
-@pytest.mark.parametrize("smooth", some([False], [True]))
+@pytest.mark.slow
+@pytest.mark.parametrize("smooth", [False, True])
 def test_both_delays_are_found_and_said(drive, smooth):
     """Places .5 s early, velocities .5 s late: one delay for both would be neither."""
     motion, record, start = drive

@@ -250,6 +250,7 @@ def test_wrong_input_is_found_and_said(drive, tmp_path):
         navigate(record, tmp_path)
 
 
+@pytest.mark.slow
 def test_files_with_late_rows_navigate_as_sorted_ones(drive, tmp_path):
     """Neighbours of a GNSS log and of an odometer's counter exchanged: the same bits, and it is said."""
     from truenorth.formats import read_gnss, read_odometer, write_record

@@ -132,6 +132,7 @@ def test_figures_of_a_model_that_does_not_hold_are_not_said(drive):
     assert warnings(result) == []
 
 
+@pytest.mark.slow
 def test_fixes_that_wander_are_said_and_white_ones_are_not(drive):
     """A drift of 1.5 m over 60 s is estimated, said or not; of white fixes it is said by chance once in two million."""
     motion, record, start = drive

@@ -80,6 +80,7 @@ def test_a_vehicle_that_rolls_to_rest_is_not_taken_to_stand(standing, phase):
     assert np.interp(found, time, speed).max() < STILL_VELOCITY
 
 
+@pytest.mark.slow
 def test_a_car_that_rolls_to_rest_is_aligned():
     """Zero velocity at .09 m/s, with a sigma of .01, made 11 of 39 be rejected: a sound log was inconsistent."""
     case = next(case for case in CASES if case.name == "by GNSS, tactical, car")

@@ -51,6 +51,7 @@ def test_sixteen_states_are_honest_and_twelve_are_not(flat):
     assert np.mean(flat["states12"].nees[:, TURN]) > 5.0
 
 
+@pytest.mark.slow
 def test_attitude_matching_in_the_banked_turn(banked):
     errors = banked["states16_att"]
     assert rms(level_in_turn(errors)) <= 0.36

@@ -225,6 +225,7 @@ def test_a_base_at_rest_stays(lat, altitude):
     np.testing.assert_allclose(moved, 0, atol=9.8 * 600**2 / 2 * rounding + METRES[0] * rounding / 2)
 
 
+@pytest.mark.slow
 def test_fixed_altitude_holds_height_and_vertical_velocity(drive, record):
     start = replace(drive.state(), v_n=np.array([3.0, 4.0, 5.0]))
     out = mechanise(record[:500], start, altitude="fixed")

@@ -25,6 +25,7 @@ def followed(step, onset, memory):
     return np.outer(np.where(since >= 0, np.exp(-np.maximum(since, 0) / memory), 0.0), step)
 
 
+@pytest.mark.slow
 @few_and_all(3000, few=500)
 def test_chance_shows_a_step_no_more_often_than_its_limit(runs):
     rng, logs = np.random.default_rng(0), runs

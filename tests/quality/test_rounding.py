@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from tests.runs import some
 from truenorth.aiding.aids import Odometer
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, misses
@@ -88,7 +87,8 @@ def test_a_specification_that_counts_is_left_as_it_is() -> None:
         assert with_rounding(counter, record, aided=aided) == counter
 
 
-@pytest.mark.parametrize(("run", "steps"), some([(16, 1.16)], [(1, 1.04)]))
+@pytest.mark.slow
+@pytest.mark.parametrize(("run", "steps"), [(16, 1.16), (1, 1.04)])
 def test_a_shaken_car_with_few_digits_is_no_more_sure_than_it_may_be(run: int, steps: float) -> None:
     """A vibration of about one step: 7.6 and 5.6 sigmas of heading, `aligned`, where rounding was in no sigma."""
     inputs, truth = BENCHES["odometer"].draw(9917, run)

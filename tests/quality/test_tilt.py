@@ -142,6 +142,7 @@ def test_a_base_that_goes_to_and_fro_in_the_time_of_its_sway_is_no_delay():
     assert max(float(np.abs(x).max()) for x in misses(answer, truth).values()) < 3.0
 
 
+@pytest.mark.slow
 def test_late_gyros_of_an_imu_that_spins_turn_heading():
     """Gravity does not show a turn about itself: of a spin of 15 deg/s, .05 s late, heading was 10 sigmas off."""
     inputs, truth = BENCHES["rotary"].draw(8210, 2)
@@ -176,7 +177,7 @@ def hanging(seed, scale=1.0):
     return ImuRecord(step * np.arange(1, count + 1), scale * gyro + noise, force, "rates")
 
 
-@pytest.mark.parametrize("seed", some(range(2), range(2, 4)))
+@pytest.mark.parametrize("seed", some([0], range(1, 4)))
 def test_noise_of_gyros_that_an_arm_multiplies_is_no_scale_factor(seed):
     """Errors in what an arm is fitted to made it too short: gyros of gondolas were 3 % wrong, at nine sigmas, and are not."""
     assert check_tilt(hanging(seed)).scale[:2] == pytest.approx([0.0, 0.0], abs=0.01)

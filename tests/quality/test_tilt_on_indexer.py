@@ -27,6 +27,7 @@ def scales(record, encoder):
     return {item.figures["axis"]: item.figures["scale"] for item in tilt.evidence() if item.key == "tilt.scale"}
 
 
+@pytest.mark.slow
 def test_waves_that_push_the_base_of_an_indexer_are_no_scale_factor():
     """Gyros that turn 11 % less would leave less of the force, and have the ship turn by 1 deg/s."""
     rng = np.random.default_rng([305, 25, 11])
