@@ -23,24 +23,22 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Files that take the most time, longest first: no worker begins one of them when the others are done.
 LONGEST = [
-    "alignment/test_gyro_matrix",
-    "alignment/test_transfer",
-    "alignment/test_rotary",
     "documents/test_documents",
-    "navigation/test_navigate",
-    "alignment/test_transfer_worlds",
-    "alignment/test_in_motion_recordings",
-    "alignment/test_unsaid",
-    "alignment/test_recordings",
-    "navigation/test_poorer",
-    "alignment/test_rivals",
-    "test_messages",
     "formats/test_corpus",
+    "alignment/test_transfer",
+    "formats/test_field_logs",
+    "formats/test_second_reading",
+    "fuzz/test_listed",
+    "test_cli",
+    "alignment/test_laws",
     "test_import",
-    "quality/test_tilt",
-    "alignment/test_late_gyro",
-    "alignment/test_rest_rate",
-    "test_house",
+    "navigation/test_departure",
+    "alignment/test_unsaid",
+    "fuzz/test_readers",
+    "formats/test_logs_read_before",
+    "live/test_run",
+    "navigation/test_navigate",
+    "alignment/test_rotary",
 ]
 
 # Time on the wall counts what else the machine does; the first example of a property may compile its kernels.

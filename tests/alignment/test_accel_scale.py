@@ -42,6 +42,7 @@ def test_a_small_one_that_no_specification_names_refuses_nothing(axis):
     assert answer_with(inputs, axis, 1e-4).status == "aligned"
 
 
+@pytest.mark.slow
 def test_a_scale_factor_that_the_specification_names_is_a_state_and_no_fault():
     inputs, _ = BENCHES["rotary"].draw(SEED, 0)
     named = inputs | {"imu": replace(inputs["imu"], accel_scale_factor=2e-3)}

@@ -31,6 +31,7 @@ def signed(angle):
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
+@pytest.mark.slow
 def test_fog_aligned_with_gnss_while_the_engine_idles():
     """Against the aligner for a base that stays; latitude from GNSS."""
     imu, position = recordings.fog_gps_xian()

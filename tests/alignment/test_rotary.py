@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.runs import some
 from truenorth.aiding.aids import Indexer as IndexerAid
 from truenorth.alignment import align
 from truenorth.alignment.encoder_angles import angles_at
@@ -107,6 +106,7 @@ def test_errors_of_the_indexer_itself_are_the_bodys(ship, answer):
         align_rotary(ship.record, ship.encoder, ship.place, ship.imu, offset_sigma=0.0, angle_sigma=-1.0)
 
 
+@pytest.mark.slow
 def test_an_earlier_epoch(ship):
     """Between two samples, too: the body's own attitude there."""
     middle = align_rotary(ship.record, ship.encoder, ship.place, ship.imu, at=123.4567)
@@ -127,6 +127,7 @@ def test_a_base_that_leaves_is_said(ship):
     assert any("drifts north" in reason for reason in found.reasons)
 
 
+@pytest.mark.slow
 def test_an_imu_that_may_be_off_the_axes_of_its_indexer_has_the_same_heading(ship, answer):
     """With a centimetre left open: known as well to 1 %, each with its own fit of the motion, where it fits."""
     free = align_rotary(ship.record, ship.encoder, ship.place, ship.imu)
@@ -269,7 +270,8 @@ def test_the_command(ship, tmp_path):
     assert isinstance(wrong.exception, UsageError)
 
 
-@pytest.mark.parametrize("method", some(["imakf"], ["kf", "sakf"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["imakf", "kf", "sakf"])
 def test_published_filters_find_the_body_on_an_indexer(ship, method):
     """The lever arm known, as their paper has it: within what they say, and far from it where the arm is left out."""
     record = ship.record.between(None, 300.0)

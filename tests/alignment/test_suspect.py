@@ -56,6 +56,7 @@ def sound():
     return bench.align(bench.draw(9305, 0)[0])
 
 
+@pytest.mark.slow
 def test_biases_that_are_together_too_large_are_in_sigma(sound):
     """Each of six at 2.7 of its sigmas: none alone is beyond the specification, all together are."""
     gyro, accel = sound.gyro_bias_prior, sound.accel_bias_prior

@@ -199,6 +199,7 @@ def test_what_level_driving_does_not_tell_apart_is_named(found):
     assert any("left open by this motion" in reason for reason in found.reasons)
 
 
+@pytest.mark.slow
 def test_velocity_alone_takes_its_course_and_finds_the_same(real, found):
     slave, master = real
     blind = align_transfer(slave, replace(master, C_nb=None))
@@ -262,7 +263,8 @@ def test_an_attitude_that_jumps_is_refused_for_that_reason(real):
     assert any("attitude jumped by 3 deg" in reason for reason in result.reasons)
 
 
-@pytest.mark.parametrize("how", some(["steps"], ["runs"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["steps", "runs"])
 def test_a_clock_that_steps_or_runs_at_another_rate_is_named(real, how):
     """A second in the middle of the log, or 2 %: neither is a bad specification nor a lever arm."""
     slave, master = real
@@ -443,6 +445,7 @@ def test_errors_of_the_master_count_in_sigma_and_not_in_the_sigma_against_it(rea
     assert "transfer.relative" in [item.key for item in found.evidence]
 
 
+@pytest.mark.slow
 def test_positions_bear_the_masters_velocity_error_into_navigation(real):
     """The slave's velocity is against the master's: what navigation begins with has the error that was said of it."""
     slave, master = real

@@ -178,7 +178,8 @@ def test_an_encoder_that_is_off_wobbles():
             assert np.degrees(disc["size"]) == pytest.approx(0.3, abs=0.01)
 
 
-@pytest.mark.parametrize("run", some([1], [0]))
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [1, 0])
 def test_a_late_encoder_is_in_sigma_or_refused(run):
     """20 ms, while both axes go on turning: level was up to 80 sigmas off, and heading 15, without a word."""
     from dataclasses import replace
@@ -300,6 +301,7 @@ def test_the_table_counts():
     ]
 
 
+@pytest.mark.slow
 def test_a_scale_factor_under_gravity_is_no_bias_beyond_its_specification():
     """Drawn: 164 ug of bias and 130 ppm of scale factor, where both are 50: 283 ug as the filter finds it."""
     inputs, _ = BENCHES["odometer"].draw(8204, 7)

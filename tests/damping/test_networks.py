@@ -149,6 +149,7 @@ def test_switching():
     assert corrected < 0.3 * undamped
 
 
+@pytest.mark.slow
 def test_a_constant_reference_error_ends_in_the_latitude():
     """With azimuth damping, ``R dL = 2 zeta_U c_N/w_ie`` in either hemisphere, and heading is free of it."""
     for lat in (50.0, -50.0):

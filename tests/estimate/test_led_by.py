@@ -51,6 +51,7 @@ def noisy(log, rng):
     return again, again(log)
 
 
+@pytest.mark.slow
 def test_steps_that_the_filter_follows_in_swings_are_seen_by_its_own_response_where_there_is_doubt():
     step = np.array([0.22, -0.33])
     log, doubted = receiver(np.outer(TIME > 120.0, step)), 0

@@ -55,6 +55,7 @@ def found_in(errors, slow, said=True):
     return fitted(run, slow, sources, said=said)
 
 
+@pytest.mark.slow
 def test_noise_and_slow_errors_are_found_as_they_were_drawn():
     """Of 900 fixes: noise to 5 %, what lasts for a minute is seen some fifteen times on three axes."""
     rng = np.random.default_rng(3)

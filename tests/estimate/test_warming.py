@@ -39,6 +39,7 @@ def filter_of(rng):
     return run
 
 
+@pytest.mark.slow
 @few_and_all(2000, few=200)
 def test_of_sound_logs_no_more_than_is_said_have_a_rival_that_warms_up(runs):
     """Markov's bound: exp(-limit / 2) of them; the band is that of a Poisson count, once in a thousand."""

@@ -110,6 +110,7 @@ def test_a_resolution_too_coarse_for_north_is_named(tmp_path):
         align(read_imu(path), PLACE, "consumer")
 
 
+@pytest.mark.slow
 def test_a_command_that_read_novatel_ends_without_a_word(tmp_path):
     """The decoder counts what Python leaves at its end, and called it leaked."""
     log, _ = novatel(tmp_path)

@@ -104,6 +104,7 @@ def test_it_is_what_navigate_says_of_the_rows_until_now():
     assert found.status == "navigated"
 
 
+@pytest.mark.slow
 def test_chunks_and_questions_change_no_bit_nor_does_a_run_that_was_saved(tmp_path):
     """One that is asked often and one that is never asked before its end, one row at a time, and half of it from a file."""
     case = Anchored(CALM, "consumer", 120.0, 3)

@@ -7,7 +7,6 @@ import pytest
 from typer.testing import CliRunner
 
 import truenorth as tn
-from tests.runs import some
 from truenorth.cli import app
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.formats import write_imu
@@ -100,7 +99,8 @@ def test_a_start_from_heading_and_place(poor):
     assert np.all(np.abs(error(result.C_nb[-1], poor.truth.C_nb[-1])) < 4.0 * np.sqrt(np.diag(result.track.P[-1])[:3]))
 
 
-@pytest.mark.parametrize("acceleration", some([4.0], [1.5]))
+@pytest.mark.slow
+@pytest.mark.parametrize("acceleration", [4.0, 1.5])
 def test_a_level_is_taken_before_the_vehicle_drives_off(acceleration):
     """Motion is found in whole seconds: the last of them before it may hold its onset, which tilts a level by degrees."""
     motion = course(PLACE, [*straight(30.0), *accelerate(15.0, acceleration, 0.0), *straight(20.0)], heading=HEADING)

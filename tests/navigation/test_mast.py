@@ -36,6 +36,7 @@ def test_a_known_arm_whose_swing_is_not_shown_keeps_the_track():
     assert max(np.abs(ratio).max() for ratio in found.ratios.values()) < 4.0
 
 
+@pytest.mark.slow
 def test_a_receiver_that_shows_the_swing_has_no_unseen_arm():
     result, found = carried("industrial", 0, (0.3, -0.2, 2.0), 0.0, said=True)
     assert result.status == "navigated"

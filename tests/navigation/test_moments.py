@@ -115,6 +115,7 @@ def test_sigma_is_honest_with_one_delay_and_with_two(places, velocities):
     assert np.sqrt(np.mean(np.square(delays))) < 1.6
 
 
+@pytest.mark.slow
 def test_both_delays_of_an_alignment_are_gone_on_with(tmp_path):
     """From the answer and from its folder: they are taken over, each with its sigma."""
     _, record, gnss = logs("turning", 1)

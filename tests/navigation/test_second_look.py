@@ -121,6 +121,7 @@ def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
     assert second_look(found, found, known) == []
 
 
+@pytest.mark.slow
 def test_figures_of_a_model_that_does_not_hold_are_not_said(drive):
     """Vertical velocity counted downwards on a road too flat to tell by: no clock or arm is blamed for it."""
     motion, record, start = drive

@@ -66,6 +66,7 @@ def test_slip_is_kept_out_by_a_gate_not_by_strong_tracking(drives):
     assert diverged(tracking).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_methods_meet_the_same_data(drives):
     again = drive(ring(), 2, 21)
     assert np.array_equal(again.dtheta, drives.dtheta[:2])

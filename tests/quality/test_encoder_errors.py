@@ -160,6 +160,7 @@ def test_a_slip_is_found_as_large_as_it_is(over, runs):
         assert slip.evidence().figures["size"] == -slip.size
 
 
+@pytest.mark.slow
 @few_and_all(10, few=2)
 def test_a_slip_in_a_gap(runs):
     for run in range(runs):
