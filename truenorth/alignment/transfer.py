@@ -19,7 +19,7 @@ from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged, noise_in
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer
-from truenorth.alignment.transfer_axes import slave_axes
+from truenorth.alignment.transfer_axes import same_axes, slave_axes
 from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, Matching, transfer_filter
 from truenorth.alignment.transfer_passes import found_in_passes
 from truenorth.alignment.transfer_shaken import shaken_evidence
@@ -32,7 +32,8 @@ from truenorth.core.position import Position
 from truenorth.errors.group import Group
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
-from truenorth.estimate.rivals import likelihood_ratio, noise_evidence, wandering_evidence
+from truenorth.estimate.poorer import BIASES, KINDS, poorer_rivals, poorer_tracks
+from truenorth.estimate.rivals import Rival, likelihood_ratio, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
@@ -221,7 +222,15 @@ def _aligned(
     along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
     run = partial(along, master=master, matching=rows)
     track = run(part, model=model, start=start)
-    seen = _seen(slave, master, errors, said) + _rivals(part, run, track, model, start, spec)
+
+    def of_another_imu(other: ImuSpec) -> Track:
+        """The same measurements of a slave by another specification, with the master's errors estimated."""
+        own = _model(other, said, what, flexure, errors, same_axes(other, said, model.groups))
+        own = own if errors == MasterErrors() else replace(own, considered=False)
+        _, begun = hand_over(slave, master, own, other, said, noise, position=position)
+        return run(part, model=own, start=begun)
+
+    seen = _seen(slave, master, errors, said) + _rivals(part, run, track, model, start, spec, of_another_imu)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
     track = as_said_together(track, model, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
@@ -258,8 +267,9 @@ def _rivals(
     model: TransferModel,
     start: Start,
     spec: ImuSpec,
+    of_another_imu: Callable[[ImuSpec], Track],
 ) -> list[Evidence]:
-    """What else would explain the log; `run` with a slave, a model and a start.
+    """What else would explain the log; `run` with a slave, a model and a start, or the same of another IMU.
 
     A likelihood is that of innovations which are white. Those of a filter that considers the master's errors are not: the errors
     are in all of them alike. A rival that follows the master more closely has them in none, and is likelier however sound the
@@ -272,9 +282,13 @@ def _rivals(
     if model.master != MasterErrors():
         model = replace(model, considered=False)
         track = other(model)
-    warming = partial(warming_rivals, partial(run, model=model, start=start), track, part, spec)
+
+    def of_another_course() -> list[Rival]:
+        poorer = poorer_rivals(track, poorer_tracks(of_another_imu, track, spec, KINDS | BIASES))
+        return warming_rivals(partial(run, model=model, start=start), track, part, spec) + poorer
+
     found = noise_evidence(other, track, model, part)
-    found += wandering_evidence(other, track, model, spec, part.duration, warming=warming)
+    found += wandering_evidence(other, track, model, spec, part.duration, warming=of_another_course)
     found += spike_evidence(partial(run, model=model, start=start), track, part)
     wide = _any_delay(start, model)
 

@@ -11,6 +11,7 @@ noise have their states.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,12 @@ def slave_axes(
     if accel * pushed > least:
         found.append(accel_axes(spec, standing(assumed.C_mb)))
     return tuple(found)
+
+
+def same_axes(spec: ImuSpec, assumed: Assumed, groups: Collection[str]) -> tuple[Group, ...]:
+    """Those of `groups` (names) as another specification has them."""
+    of_both = gyro_axes(spec), accel_axes(spec, standing(assumed.C_mb))
+    return tuple(group for group in of_both if group.name in groups)
 
 
 def _motion(slave: ImuRecord) -> tuple[float, float]:
