@@ -31,6 +31,7 @@ from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.arm import filtered_by_possible_arm, looser_track
 from truenorth.navigation.by_start import start_evidence
+from truenorth.navigation.curve import with_curve
 from truenorth.navigation.given import (
     arm_as_begun,
     by_key,
@@ -233,7 +234,7 @@ def _by_specification(
     result = Navigation(
         status="navigated",
         evidence=(),
-        track=_counted_whole(track, given),
+        track=_counted_whole(with_curve(track, plan.sources(used)), given),
         altitude=height,
         smoothed=smooth,
         gaps=gaps,
