@@ -15,7 +15,8 @@ Integers = NDArray[np.int64]
 
 MEASURE, DISTURB, PLACE = range(3)  # what an event of a source does
 ABSENT, USED, REJECTED, REOPENED = range(4)  # verdicts
-# how a correction is fed back: as it is; by :mod:`truenorth.errors.invariant`; by :mod:`truenorth.errors.azimuth_free`
+# How a correction is fed back: as it is; with velocity turned (:mod:`truenorth.errors.invariant`); and, where nothing shows
+# velocity or place over the ground, with the gyros' biases turned too (:mod:`truenorth.errors.azimuth_free`).
 AS_IT_IS, OVER_GROUND, IN_BODY = range(3)
 BACK, AHEAD = 2, 3  # samples before and after an epoch that its rate is taken from
 

@@ -199,10 +199,7 @@ def navigate_track(
         Carry the covariance; needed for any aiding.
     smooth : bool
         Smooth over the whole log (Rauch, Tung, Striebel).
-    invariant : int
-        How a correction is fed back: ``AS_IT_IS``; ``OVER_GROUND``, where velocity turns with attitude
-        (:mod:`truenorth.errors.invariant`), for a heading that is far off; ``IN_BODY``, where nothing shows velocity or place
-        over the ground (:mod:`truenorth.errors.azimuth_free`).
+    invariant : {AS_IT_IS, OVER_GROUND, IN_BODY} of :mod:`truenorth.estimate.memory`: how a correction is fed back
     prior, off : (P, values) and (n,) array, optional
         Of all states, and of an open loop: see :func:`begin`.
     open_until : float, optional, s
