@@ -4,9 +4,12 @@ A heading that is off by ``psi`` turns the velocity over the ground. Across the 
 Along the way it is ``v (1 - cos psi)``, which no tangent shows: of 6 m/s and 15 deg 0.2 m/s, where the log itself is good to
 0.05 m/s. A sigma of velocity is then such that k of it hold what k of the heading's make of velocity, up to four,
 
-    e = max over k <= 4 of (1 - cos(k sigma))/k,        dv = v e,    dp = int v e dt
+    along = max over k <= 4 of (1 - cos(k sigma))/k          dv = v along
 
-the place as if the heading were off to one side all the way; a way back takes that off again.
+Place is off by the sum of it, as if the heading were off to one side all the way; a way back takes that off again. Once the
+heading is found, place is corrected by ``v psi`` across the way, where it was off by ``v sin psi``:
+
+    across = max over k <= 4 of (k sigma - sin(k sigma))/k   dp = int v along dt, and int u x v across dt
 """
 
 from __future__ import annotations
@@ -15,17 +18,26 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.aiding.row import BODY_FRAME
 from truenorth.aiding.source import Aiding
 from truenorth.state.layout import DP, DV, PHI
 from truenorth.state.track import Track
 
+Array = NDArray[np.float64]
+
 MOST = 4.0  # sigmas
 TURN = 2.3311  # rad, where (1 - cos x)/x is largest: tan(x/2) = x
 
 
-def with_curve(track: Track, aiding: Sequence[Aiding]) -> Track:
+def seen_in_body(aiding: Sequence[Aiding]) -> bool:
+    """Whether velocity is seen in the body, and neither it nor place over the ground."""
+    in_body = any(source.row.axes == BODY_FRAME and source.row.unit == "m/s" for source in aiding)
+    return in_body and not any(source.over_ground for source in aiding)
+
+
+def with_curve(track: Track, aiding: Sequence[Aiding], before: Track | None = None) -> Track:
     """The track with what the curve of its velocity adds to the covariance of velocity and place, where it is seen in the body.
 
     Parameters
@@ -34,16 +46,29 @@ def with_curve(track: Track, aiding: Sequence[Aiding]) -> Track:
         From its start on.
     aiding : sequence of Aiding
         Its measurements; where one of them shows velocity or place over the ground, or none velocity, the track is what it was.
+    before : Track, optional
+        The same epochs as filtered, of a track that is smoothed: place was corrected by what heading was off before.
     """
-    in_body = any(source.row.axes == BODY_FRAME and source.row.unit == "m/s" for source in aiding)
-    if not in_body or any(source.over_ground for source in aiding) or not len(track.P):
+    if not seen_in_body(aiding) or not len(track.P):
         return track
+    off, _ = _off(track)
+    way, aside = (_summed(x, track.time) for x in _off(track if before is None else before))
+    n = track.P.shape[:2]
+    along, across = np.zeros(n), np.zeros(n)
+    along[:, DV], along[:, DP], across[:, DP] = off, way, aside
+    return replace(track, P=track.P + sum(x[:, :, None] * x[:, None, :] for x in (along, across)))
+
+
+def _off(track: Track) -> tuple[Array, Array]:
+    """(K, 3) m/s, by which a velocity is off along and across the way beyond what its covariance says."""
     sigma = np.maximum(track.sigma[:, PHI][:, 2], 1e-12)
     k = np.minimum(MOST, TURN / sigma)
-    off = track.v_n * ((1.0 - np.cos(k * sigma)) / k)[:, None]
-    off[:, 2] = 0.0
-    way = np.zeros_like(off)
-    way[1:] = np.cumsum(0.5 * (off[1:] + off[:-1]) * np.diff(track.time)[:, None], axis=0)
-    both = np.zeros(track.P.shape[:2])
-    both[:, DV], both[:, DP] = off, way
-    return replace(track, P=track.P + both[:, :, None] * both[:, None, :])
+    level = track.v_n * [1.0, 1.0, 0.0]
+    along, across = (1.0 - np.cos(k * sigma)) / k, sigma - np.sin(MOST * sigma) / MOST
+    return level * along[:, None], np.cross([0.0, 0.0, 1.0], level) * across[:, None]
+
+
+def _summed(rate: Array, time: Array) -> Array:
+    """(K, 3) its integral from the first epoch on."""
+    steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)[:, None]
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
