@@ -10,6 +10,9 @@ Place is off by the sum of it, as if the heading were off to one side all the wa
 heading is found, place is corrected by ``v psi`` across the way, where it was off by ``v sin psi``:
 
     across = max over k <= 4 of (k sigma - sin(k sigma))/k   dp = int v along dt, and int u x v across dt
+
+Of a heading that may be any within four sigmas (beyond 33 deg) the way may have led anywhere, as may the one that was found: they
+end up to twice their length apart, and half of that length is a sigma, in any direction.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.row import BODY_FRAME
 from truenorth.aiding.source import Aiding
-from truenorth.state.layout import DP, DV, PHI
+from truenorth.state.layout import DP, DV
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -52,16 +55,21 @@ def with_curve(track: Track, aiding: Sequence[Aiding], before: Track | None = No
     if not seen_in_body(aiding) or not len(track.P):
         return track
     off, _ = _off(track)
-    way, aside = (_summed(x, track.time) for x in _off(track if before is None else before))
+    filtered = track if before is None else before
+    way, aside = (_summed(x, track.time) for x in _off(filtered))
+    lost = _summed(np.linalg.norm(filtered.v_n[:, :2], axis=1) * (MOST * filtered.sigma[:, 2] > TURN), track.time) / 2.0
     n = track.P.shape[:2]
     along, across = np.zeros(n), np.zeros(n)
     along[:, DV], along[:, DP], across[:, DP] = off, way, aside
-    return replace(track, P=track.P + sum(x[:, :, None] * x[:, None, :] for x in (along, across)))
+    P = track.P + sum(x[:, :, None] * x[:, None, :] for x in (along, across))
+    for j in range(DP.start, DP.start + 2):
+        P[:, j, j] += lost**2
+    return replace(track, P=P)
 
 
 def _off(track: Track) -> tuple[Array, Array]:
     """(K, 3) m/s, by which a velocity is off along and across the way beyond what its covariance says."""
-    sigma = np.maximum(track.sigma[:, PHI][:, 2], 1e-12)
+    sigma = np.maximum(track.sigma[:, 2], 1e-12)
     k = np.minimum(MOST, TURN / sigma)
     level = track.v_n * [1.0, 1.0, 0.0]
     along, across = (1.0 - np.cos(k * sigma)) / k, sigma - np.sin(MOST * sigma) / MOST
@@ -69,6 +77,6 @@ def _off(track: Track) -> tuple[Array, Array]:
 
 
 def _summed(rate: Array, time: Array) -> Array:
-    """(K, 3) its integral from the first epoch on."""
-    steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)[:, None]
-    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    """Its integral from the first epoch on, along the first axis (K, ..)."""
+    steps = 0.5 * ((rate[1:] + rate[:-1]).T * np.diff(time)).T
+    return np.concatenate([np.zeros_like(rate[:1]), np.cumsum(steps, axis=0)])
