@@ -304,17 +304,6 @@ def quaternion_from_rotation_vector(rotation: Any) -> Any:
     return math.cos(0.5 * angle), s * x, s * y, s * z
 
 
-@borrowing
-def rotation_vector_of(q: Any) -> Any:
-    """The rotation vector of a quaternion, tuples; the shorter way round."""
-    sign = 1.0 if q[0] >= 0.0 else -1.0
-    sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    scale = 2.0 * sign
-    if sine > 1e-9:
-        scale = 2.0 * sign * math.atan2(sine, sign * q[0]) / sine
-    return scale * q[1], scale * q[2], scale * q[3]
-
-
 @borrowing(forceinline=True)
 def quaternion_of_small(rotation: Any) -> Any:
     """The same of a rotation below .01 rad, by series: without a choice, so that a loop over many goes in vectors."""

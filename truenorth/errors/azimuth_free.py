@@ -30,14 +30,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from truenorth.core.attitude import (
-    quaternion_from_rotation_vector,
-    quaternion_product,
-    rotate,
-    rotation_vector_of,
-)
+from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product, rotate
 from truenorth.core.compiled import borrowing
 from truenorth.core.earth import EARTH_RATE
+from truenorth.errors.invariant import rotation_vector_of
 from truenorth.strapdown.wander import earth_axis
 
 _PHI, _DV, _BG = 0, 3, 9

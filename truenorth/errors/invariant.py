@@ -42,6 +42,17 @@ SMALL = 1e-4  # rad, below which the Jacobian's series is exact to rounding
 
 
 @borrowing
+def rotation_vector_of(q: Any) -> Any:
+    """The rotation vector of a quaternion, tuples; the shorter way round."""
+    sign = 1.0 if q[0] >= 0.0 else -1.0
+    sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    scale = 2.0 * sign
+    if sine > 1e-9:
+        scale = 2.0 * sign * math.atan2(sine, sign * q[0]) / sine
+    return scale * q[1], scale * q[2], scale * q[3]
+
+
+@borrowing
 def left_jacobian(phi: Any, e: Any) -> Any:
     """``J(phi) e``: what ``exp([-(phi + e) x])`` leaves of itself after ``exp([phi x])``, as a rotation vector; tuples."""
     angle = math.sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])

@@ -8,9 +8,10 @@ import numpy as np
 
 from truenorth.aiding.row import AT_FILTER, beyond_noise, by_axes, row_at
 from truenorth.core import earth
-from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product, rotation_vector_of
+from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product
 from truenorth.core.compiled import borrowing
 from truenorth.core.linalg import dot_at
+from truenorth.errors.invariant import rotation_vector_of
 from truenorth.estimate.memory import Memory, Model, Sources
 from truenorth.filters.recursion import (
     NO_INNOVATION_VARIANCE,
