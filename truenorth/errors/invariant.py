@@ -42,6 +42,17 @@ SMALL = 1e-4  # rad, below which the Jacobian's series is exact to rounding
 
 
 @borrowing
+def rotation_vector_of(q: Any) -> Any:
+    """The rotation vector of a quaternion, tuples; the shorter way round."""
+    sign = 1.0 if q[0] >= 0.0 else -1.0
+    sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    scale = 2.0 * sign
+    if sine > 1e-9:
+        scale = 2.0 * sign * math.atan2(sine, sign * q[0]) / sine
+    return scale * q[1], scale * q[2], scale * q[3]
+
+
+@borrowing
 def left_jacobian(phi: Any, e: Any) -> Any:
     """``J(phi) e``: what ``exp([-(phi + e) x])`` leaves of itself after ``exp([phi x])``, as a rotation vector; tuples."""
     angle = math.sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
@@ -64,18 +75,19 @@ def corrected_velocity(v: Any, phi: Any, xi: Any) -> Any:
 
 
 @borrowing
-def _correction(phi: Any, v: Any, x: Any) -> Any:
+def _correction(phi: Any, v: Any, level: bool, x: Any) -> Any:
     """``xi`` of a correction, and the velocity after it; tuples."""
     turned = cross(phi, v)
-    xi = (x[_DV] + turned[0], x[_DV + 1] + turned[1], x[_DV + 2] + turned[2])
-    return xi, corrected_velocity(v, phi, xi)
+    xi = (x[_DV] + turned[0], x[_DV + 1] + turned[1], 0.0 if level else x[_DV + 2] + turned[2])
+    after = corrected_velocity(v, phi, xi)
+    return xi, (after[0], after[1], v[2] if level else after[2])
 
 
 @borrowing
-def carried(phi: Any, xi: Any, v: Any, after: Any, p: Any, d: Any) -> Any:
+def carried(phi: Any, xi: Any, v: Any, after: Any, level: bool, p: Any, d: Any) -> Any:
     """Errors `p` of attitude and `d` of velocity beyond a correction, as those left after it; tuples."""
     back = cross(v, p)
-    d = left_jacobian(phi, (d[0] - back[0], d[1] - back[1], d[2] - back[2]))
+    d = left_jacobian(phi, (d[0] - back[0], d[1] - back[1], 0.0 if level else d[2] - back[2]))
     a = cross(xi, p)
     b, c = cross(phi, a), cross(xi, cross(phi, p))
     d = (
@@ -85,11 +97,11 @@ def carried(phi: Any, xi: Any, v: Any, after: Any, p: Any, d: Any) -> Any:
     )
     p = left_jacobian(phi, p)
     forth = cross(after, p)
-    return (p[0], p[1], p[2]), (d[0] + forth[0], d[1] + forth[1], d[2] + forth[2])
+    return (p[0], p[1], p[2]), (d[0] + forth[0], d[1] + forth[1], 0.0 if level else d[2] + forth[2])
 
 
 @borrowing
-def reset(s: Any, x: Any, P: Any) -> None:
+def reset(s: Any, x: Any, P: Any, level: bool) -> None:
     """Prepare a correction for being fed back as one of invariant errors.
 
     Parameters
@@ -100,15 +112,17 @@ def reset(s: Any, x: Any, P: Any) -> None:
         The estimated errors; that of velocity becomes what takes the velocity where it belongs.
     P : (N, N) array
         Their covariance, carried to the errors left.
+    level : bool
+        The vertical velocity is held at zero, and has no error.
     """
     phi, v = (x[_PHI], x[_PHI + 1], x[_PHI + 2]), (s[4], s[5], s[6])
-    xi, after = _correction(phi, v, x)
+    xi, after = _correction(phi, v, level, x)
     for side in range(2):  # D P, then its rows as columns: D P D'
         for j in range(P.shape[0]):
             if side == 0:
-                p, d = carried(phi, xi, v, after, (P[0, j], P[1, j], P[2, j]), (P[3, j], P[4, j], P[5, j]))
+                p, d = carried(phi, xi, v, after, level, (P[0, j], P[1, j], P[2, j]), (P[3, j], P[4, j], P[5, j]))
             else:
-                p, d = carried(phi, xi, v, after, (P[j, 0], P[j, 1], P[j, 2]), (P[j, 3], P[j, 4], P[j, 5]))
+                p, d = carried(phi, xi, v, after, level, (P[j, 0], P[j, 1], P[j, 2]), (P[j, 3], P[j, 4], P[j, 5]))
             for i in range(3):
                 if side == 0:
                     P[_PHI + i, j], P[_DV + i, j] = p[i], d[i]
@@ -122,13 +136,13 @@ def reset(s: Any, x: Any, P: Any) -> None:
 
 
 @borrowing
-def keep_reset(s: Any, x: Any, link: int, D: Any) -> None:
-    """Fill in ``D[link]`` (6, 6), by which :func:`reset` will carry errors of attitude and velocity to those that are left."""
+def keep_reset(s: Any, x: Any, level: bool, D: Any) -> None:
+    """Fill in attitude and velocity of `D` (n, n), by which :func:`reset` will carry errors to those that are left."""
     phi, v = (x[_PHI], x[_PHI + 1], x[_PHI + 2]), (s[4], s[5], s[6])
-    xi, after = _correction(phi, v, x)
+    xi, after = _correction(phi, v, level, x)
     for j in range(6):
         of_phi = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
         of_dv = (1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0)
-        p, d = carried(phi, xi, v, after, of_phi, of_dv)
+        p, d = carried(phi, xi, v, after, level, of_phi, of_dv)
         for i in range(3):
-            D[link, _PHI + i, j], D[link, _DV + i, j] = p[i], d[i]
+            D[_PHI + i, j], D[_DV + i, j] = p[i], d[i]

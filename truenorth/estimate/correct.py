@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from truenorth.core import earth
 from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product
 from truenorth.core.compiled import borrowing
 from truenorth.core.linalg import dot_at
+from truenorth.errors.invariant import rotation_vector_of
 from truenorth.estimate.memory import Memory, Model, Sources
 from truenorth.filters.recursion import (
     NO_INNOVATION_VARIANCE,
@@ -167,17 +167,6 @@ def damp_height(size: Any, C: Any, T: float, time_constant: float, w: Any) -> No
         w.x[i] += w.k[i] * nu
         for j in range(len(size)):
             w.P[i, j] += variance * w.k[i] * w.k[j] - (w.k[i] * w.a[j] + w.a[i] * w.k[j])
-
-
-@borrowing
-def rotation_vector_of(q: Any) -> Any:
-    """The rotation vector of a quaternion, tuples; the shorter way round."""
-    sign = 1.0 if q[0] >= 0.0 else -1.0
-    sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    scale = 2.0 * sign
-    if sine > 1e-9:
-        scale = 2.0 * sign * math.atan2(sine, sign * q[0]) / sine
-    return scale * q[1], scale * q[2], scale * q[3]
 
 
 @borrowing(forceinline=True)

@@ -13,7 +13,7 @@ from truenorth.aiding.source import Aiding
 from truenorth.core.errors import UsageError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.loop import SAME_TIME
-from truenorth.estimate.memory import Memory, Samples
+from truenorth.estimate.memory import AS_IT_IS, Memory, Samples
 from truenorth.strapdown.increments import ImuRows
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Setting:
     every: int = 1
     covariance: bool = True  # carry the covariance; needed for any aiding
     smooth: bool = False  # keep what the smoother needs: of a log in one chunk
-    invariant: bool = False  # corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`)
+    invariant: int = AS_IT_IS  # how a correction is fed back
     # s; before it corrections are not fed back: all is linearised about the motion as the start leads to it. None: they always are
     open_until: float | None = None
     exact: bool = False  # innovations of that loop are those of the motion with its errors taken off

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
-from truenorth.errors.invariant import keep_reset, reset
+from truenorth.errors import azimuth_free, invariant
 from truenorth.estimate.apart import innovations_there, is_exact
 from truenorth.estimate.correct import (
     damp_height,
@@ -34,6 +34,8 @@ from truenorth.estimate.correct import (
 from truenorth.estimate.memory import (
     ABSENT,
     DISTURB,
+    IN_BODY,
+    OVER_GROUND,
     PLACE,
     REJECTED,
     REOPENED,
@@ -165,10 +167,14 @@ def correct(
             feed_back(m.s, m.aux, m.x, model.dynamics.turns)
             set_matrix(m.s, m.sums.C_now)
         return SOUND
-    if model.invariant:
+    if model.invariant == IN_BODY:
         if smoothing:
-            keep_reset(m.s, w.x, link, kept.D)
-        reset(m.s, w.x, w.P)
+            azimuth_free.keep_reset(m.s, w.x, kept.D[link])
+        azimuth_free.reset(m.s, w.x, w.P)
+    elif model.invariant == OVER_GROUND:
+        if smoothing:
+            invariant.keep_reset(m.s, w.x, model.fixed_altitude, kept.D[link])
+        invariant.reset(m.s, w.x, w.P, model.fixed_altitude)
     feed_back(m.s, m.aux, w.x, model.dynamics.turns)
     set_matrix(m.s, m.sums.C_now)
     return SOUND

@@ -15,6 +15,9 @@ Integers = NDArray[np.int64]
 
 MEASURE, DISTURB, PLACE = range(3)  # what an event of a source does
 ABSENT, USED, REJECTED, REOPENED = range(4)  # verdicts
+# How a correction is fed back: as it is; with velocity turned (:mod:`truenorth.errors.invariant`); and, where nothing shows
+# velocity or place over the ground, with the gyros' biases turned too (:mod:`truenorth.errors.azimuth_free`).
+AS_IT_IS, OVER_GROUND, IN_BODY = range(3)
 BACK, AHEAD = 2, 3  # samples before and after an epoch that its rate is taken from
 
 
@@ -69,7 +72,7 @@ class Model(NamedTuple):
     fixed_altitude: bool
     turn_scale: float
     turn_cross: float
-    invariant: bool
+    invariant: int  # how a correction is fed back
     covariance: bool
     held: bool
     spare: float = 0.0
@@ -94,8 +97,8 @@ class Kept(NamedTuple):
     """Histories; an axis of length 0 keeps nothing.
 
     `time`, `state`, `aux`, `P` are those at each output; `when`, `innovation`, `sigma`, `nis`, `verdict` those of each
-    event, the re-timed ones behind the others; `Phi, Q, H, dx` lead from event to event, for the smoother, and `D` (6, 6) from the
-    errors of attitude and velocity before a correction to those left after it.
+    event, the re-timed ones behind the others; `Phi, Q, H, dx` lead from event to event, for the smoother, and `D` from the errors
+    before a correction to those left after it.
     """
 
     time: Array

@@ -24,6 +24,7 @@ from truenorth.estimate.events import LoopState, Rows, Setting, planned, receive
 from truenorth.estimate.memory import (
     ABSENT,
     AHEAD,
+    AS_IT_IS,
     BACK,
     DISTURB,
     MEASURE,
@@ -176,7 +177,7 @@ def navigate_track(
     every: int = 5,
     covariance: bool = True,
     smooth: bool = False,
-    invariant: bool = False,
+    invariant: int = AS_IT_IS,
     prior: tuple[Array, Array] | None = None,
     open_until: float | None = None,
     exact: bool = False,
@@ -198,8 +199,7 @@ def navigate_track(
         Carry the covariance; needed for any aiding.
     smooth : bool
         Smooth over the whole log (Rauch, Tung, Striebel).
-    invariant : bool
-        Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`): for starts with a heading that is far off.
+    invariant : {AS_IT_IS, OVER_GROUND, IN_BODY} of :mod:`truenorth.estimate.memory`: how a correction is fed back
     prior, off : (P, values) and (n,) array, optional
         Of all states, and of an open loop: see :func:`begin`.
     open_until : float, optional, s
@@ -264,7 +264,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         model.sensor_states,
         model.fixed_altitude,
         *model.turn_noise,
-        setting.invariant,
+        int(setting.invariant),
         setting.covariance,
         any(group.considered for group in model.groups),
         setting.spare(state.interval),
@@ -295,7 +295,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
     if setting.smooth:
         from truenorth.estimate.smoothing import smoothed
 
-        states, sensors, P = smoothed(Events(*plan), kept, state.memory.P, model.dynamics.turns, setting.invariant)
+        states, sensors, P = smoothed(Events(*plan), kept, state.memory.P, of_model)
     C_nb, v_n, position, C_nw = wander.north(states)
     if setting.covariance:
         turn(C_nw, v_n, position, 1.0, P)
@@ -330,7 +330,7 @@ def _room(setting: Setting, plan: Rows, late: Rows, n: int) -> Kept:
         Q=np.empty((links, n, n)),
         H=np.zeros((links, 3, n)),
         dx=np.zeros((links, n)),
-        D=np.tile(np.eye(6), (links, 1, 1)),
+        D=np.tile(np.eye(n), (links, 1, 1)),
     )
 
 

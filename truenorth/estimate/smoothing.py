@@ -2,9 +2,9 @@
 
 Corrections fed back make the loop's errors those of a linear filter less what it has corrected so far, ``x_c``. With
 ``z = nu + H x_c`` (innovation and what was corrected) the same linear filter is run again and smoothed by
-:func:`truenorth.filters.smoother`; its answer less ``x_c`` is what is left of the error at each epoch. Corrections of invariant
-errors leave them in other coordinates, those of the attitude and velocity after each: they are carried there (``D``), as the
-loop carries its covariance.
+:func:`truenorth.filters.smoother`; its answer less ``x_c`` is what is left of the error at each epoch. Corrections that
+are not fed back as they are leave them in other coordinates, those after each: they are carried there (``D``), as the loop
+carries its covariance.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors.invariant import reset
+from truenorth.errors import azimuth_free, invariant
 from truenorth.estimate.correct import feed_back
-from truenorth.estimate.memory import USED, Events, Kept
+from truenorth.estimate.memory import IN_BODY, OVER_GROUND, USED, Events, Kept, Model
 from truenorth.filters import LinearSystem
 from truenorth.filters.smoother import smoother
 from truenorth.strapdown import wander
@@ -22,9 +22,7 @@ from truenorth.strapdown import wander
 Array = NDArray[np.float64]
 
 
-def smoothed(
-    plan: Events, kept: Kept, P0: Array, turns: NDArray[np.int64], invariant: bool
-) -> tuple[Array, Array, Array]:
+def smoothed(plan: Events, kept: Kept, P0: Array, model: Model) -> tuple[Array, Array, Array]:
     """State, sensors and covariance (along w) at each output, smoothed.
 
     Parameters
@@ -34,10 +32,7 @@ def smoothed(
         Of a run made for smoothing: with its links from event to event.
     P0 : (n, n) array
         Covariance at the beginning.
-    turns : (T,) array
-        First states of rotations.
-    invariant : bool
-        Corrections turn velocity with attitude.
+    model : Model
 
     Returns
     -------
@@ -54,7 +49,7 @@ def smoothed(
     x = np.zeros(n)
     for k in range(count):
         if k > 0:
-            Phi[k, :, :6] = Phi[k, :, :6] @ kept.D[k - 1]
+            Phi[k] = Phi[k] @ kept.D[k - 1]
         x = Phi[k] @ x
         if used[k]:
             z[k] = innovation[k] + kept.H[k] @ x
@@ -65,14 +60,15 @@ def smoothed(
     answer = smoother(LinearSystem(Phi=Phi, Q=kept.Q, H=kept.H, R=R, z=z, x0=np.zeros(n), P0=P0))
     out = plan.output[linked]
     left, P, D = answer.x[out] - corrected[out], answer.P[out], kept.D[out]
-    left[:, :6] = np.einsum("kij,kj->ki", D, left[:, :6])
-    P[:, :6] = D @ P[:, :6]
-    P[:, :, :6] = P[:, :, :6] @ np.swapaxes(D, 1, 2)
+    left = np.einsum("kij,kj->ki", D, left)
+    P = D @ P @ np.swapaxes(D, 1, 2)
     state, sensors = kept.state.copy(), kept.aux.copy()
     full = np.zeros((len(state), wander.LENGTH))
     full[:, : state.shape[1]] = state
     for k in range(len(state)):
-        if invariant:
-            reset(full[k], left[k], P[k])
-        feed_back(full[k], sensors[k], left[k], turns)
+        if model.invariant == IN_BODY:
+            azimuth_free.reset(full[k], left[k], P[k])
+        elif model.invariant == OVER_GROUND:
+            invariant.reset(full[k], left[k], P[k], model.fixed_altitude)
+        feed_back(full[k], sensors[k], left[k], model.dynamics.turns)
     return full[:, : state.shape[1]], sensors, P

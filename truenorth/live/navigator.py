@@ -37,7 +37,8 @@ from truenorth.live.past import Past
 from truenorth.live.siblings import Siblings
 from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.by_start import unsure_heading
-from truenorth.navigation.given import arm_as_begun, kept_altitude, mountings_found, turns_velocity
+from truenorth.navigation.curve import with_curve
+from truenorth.navigation.given import arm_as_begun, fed_back, kept_altitude, mountings_found
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.navigation.start import acting_at_rest, force_at_rest, start_of
@@ -289,8 +290,7 @@ class Navigator:
             noise, standing=force_at_rest(self.start), groups=PLUMB_LINE.groups, fixed_altitude=fixed
         )
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
-        turns = turns_velocity(self.altitude)
-        return Setting(with_states(model, sources), tuple(sources), stride, every, invariant=turns)
+        return Setting(with_states(model, sources), tuple(sources), stride, every, invariant=fed_back(sources))
 
     def _advance(self, until: float) -> None:
         """Take the rows and measurements up to a time; rows that come for a time before it are too late."""
@@ -359,6 +359,8 @@ class Navigator:
 
         Heading is known no better than siblings leave it; `most`: how far they were before this track.
         """
+        if self._setting is not None:
+            track = with_curve(self.past.with_end(track), self._setting.sources)[-len(track) :]
         track = replace(track, residuals=self.past.residuals)
         receiver = (
             None if Gnss.key not in self.feeds else self.feeds[Gnss.key].newest(NEWEST, self._mountings.get(Gnss.key))

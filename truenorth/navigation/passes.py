@@ -19,7 +19,7 @@ from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
-from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
+from truenorth.navigation.given import fed_back, looked_at, mounted_as
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
@@ -87,7 +87,7 @@ class Plan:
             used,
             interval=self.interval,
             every=self.every,
-            invariant=turns_velocity(self.altitude),
+            invariant=fed_back(used),
             **options,
         )
 

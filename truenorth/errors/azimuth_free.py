@@ -1,0 +1,134 @@
+"""Errors of which the azimuth is unseen: what only sensors in the body see tells nothing of it but by the earth's rate.
+
+A log, a wheel and accelerometers see velocity, gravity and the earth's rate along the body's axes. All of them turned about the
+vertical along with the body look the same: another azimuth, with the velocity over the ground turned by as much and gyros that
+are biased by as much as the earth's rate then differs. That direction, of an azimuth error ``psi``,
+
+    phi_U = psi,   dv = -psi u x v,   eps = psi C' (u x w_ie)                  u up, w_ie the earth's rate
+
+turns with the estimate of azimuth. A filter that corrects azimuth along the way, and keeps its covariance as it is, has seen
+from several directions what nobody sees from one: it knows azimuth to a third of what its error is, and the ship whose gyros drift
+by 100 deg/h is 60 deg off with a sigma of 5. So a correction ``psi_hat`` is fed back along the whole curve on which all
+that is seen stays the same, not along its tangent,
+
+    C <- exp([psi u x]) exp([delta x]) C                delta the level part of phi_hat
+    v <- exp([psi u x]) (v - xi),                       xi = dv_hat + psi u x v
+    b <- b + eta + C' (w_ie - exp([-psi u x]) w_ie),    eta = eps_hat - psi C' (u x w_ie)
+
+and the covariance follows: ``psi, xi, eta`` are what they were, along axes that have turned. Level errors turn with the body, so
+that what they and the biases of accelerometers have to do with each other stays the same, too.
+
+The logarithm of :mod:`truenorth.errors.invariant` is straight where velocity is known over the ground; here the body knows it.
+
+Sources: A. Barrau, S. Bonnabel, "The invariant extended Kalman filter as a stable observer", IEEE Trans. Autom. Control
+62 (2017); G. Huang, A. Mourikis and S. Roumeliotis, "Analysis and improvement of the consistency of extended Kalman filter
+based SLAM", ICRA 2008 (what a filter believes to see by a linearisation that moves).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product, rotate
+from truenorth.core.compiled import borrowing
+from truenorth.core.earth import EARTH_RATE
+from truenorth.errors.invariant import rotation_vector_of
+from truenorth.strapdown.wander import earth_axis
+
+_PHI, _DV, _BG = 0, 3, 9
+
+
+@borrowing
+def _turned(azimuth: float, v: Any) -> Any:
+    """``exp([psi u x]) v``; tuples."""
+    s, c = math.sin(azimuth), math.cos(azimuth)
+    return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
+
+
+@borrowing
+def _back(q: Any, v: Any) -> Any:
+    """A vector in axes of the body, tuples."""
+    return rotate((q[0], -q[1], -q[2], -q[3]), v)
+
+
+@borrowing
+def _attitude_after(q: Any, x: Any) -> Any:
+    """The quaternion once a correction is made, tuples."""
+    level = quaternion_product(quaternion_from_rotation_vector((x[_PHI], x[_PHI + 1], 0.0)), q)
+    return quaternion_product(quaternion_from_rotation_vector((0.0, 0.0, x[_PHI + 2])), level)
+
+
+@borrowing
+def _velocity_after(v: Any, x: Any) -> Any:
+    """The velocity once a correction is made, tuples."""
+    psi = x[_PHI + 2]
+    return _turned(psi, (v[0] - x[_DV] + psi * v[1], v[1] - x[_DV + 1] - psi * v[0], v[2] - x[_DV + 2]))
+
+
+@borrowing
+def _earth_rate(s: Any) -> Any:
+    axis = earth_axis(s)
+    return EARTH_RATE * axis[0], EARTH_RATE * axis[1], EARTH_RATE * axis[2]
+
+
+@borrowing
+def carry(s: Any, x: Any, e: Any) -> None:
+    """Turn errors `e` (n,) beyond a correction into those left after it, in place; `s` and `x` are those before it."""
+    q, v, psi = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6]), x[_PHI + 2]
+    after, v_after = _attitude_after(q, x), _velocity_after(v, x)
+    w = _earth_rate(s)
+    p = e[_PHI + 2]
+    xi = _turned(psi, (e[_DV] - p * v[1], e[_DV + 1] + p * v[0], e[_DV + 2]))
+    was, now = _back(q, (-w[1], w[0], 0.0)), _back(after, (-w[1], w[0], 0.0))
+    e[_PHI], e[_PHI + 1], _ = _turned(psi, (e[_PHI], e[_PHI + 1], p))
+    e[_DV], e[_DV + 1] = xi[0] + p * v_after[1], xi[1] - p * v_after[0]
+    for i in range(3):
+        e[_BG + i] += p * (now[i] - was[i])
+
+
+@borrowing
+def _transpose(M: Any) -> None:
+    for i in range(M.shape[0]):
+        for j in range(i):
+            M[i, j], M[j, i] = M[j, i], M[i, j]
+
+
+@borrowing
+def reset(s: Any, x: Any, P: Any) -> None:
+    """Prepare a correction for being fed back along the curve on which the body's sensors see the same.
+
+    Parameters
+    ----------
+    s : (24,) array
+        The state before the correction, see :mod:`truenorth.strapdown.wander`.
+    x : (n,) array
+        The estimated errors; those of attitude, velocity and gyro bias become what takes them where they belong.
+    P : (N, N) array
+        Their covariance, carried to the errors left.
+    """
+    for _ in range(2):  # the rows of P, then those of (P D')': D P D'
+        for j in range(P.shape[0]):
+            carry(s, x, P[j])
+        _transpose(P)
+    for i in range(P.shape[0]):
+        for j in range(i):
+            P[j, i] = P[i, j]
+    q, v, psi = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6]), x[_PHI + 2]
+    w, v_after, after = _earth_rate(s), _velocity_after(v, x), _attitude_after(q, x)
+    seen = _turned(-psi, w)
+    chord = _back(q, (w[0] - seen[0] + psi * w[1], w[1] - seen[1] - psi * w[0], 0.0))
+    for i in range(3):
+        x[_DV + i] = v[i] - v_after[i]
+        x[_BG + i] += chord[i]
+    x[_PHI], x[_PHI + 1], x[_PHI + 2] = rotation_vector_of(quaternion_product(after, (q[0], -q[1], -q[2], -q[3])))
+
+
+@borrowing
+def keep_reset(s: Any, x: Any, D: Any) -> None:
+    """Fill in `D` (n, n), by which :func:`reset` will carry errors to those that are left."""
+    for j in range(len(D)):
+        for i in range(len(D)):
+            D[j, i] = 1.0 * (i == j)
+        carry(s, x, D[j])
+    _transpose(D)
