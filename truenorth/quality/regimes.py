@@ -44,9 +44,7 @@ STILL, DISTURBED, SWAYING, ROTATING, MOVING = range(5)
 
 TURN_WINDOW = 21  # s, odd; a sway cancels in it, a turn does not
 NOISE_FACTOR = 4.0  # wander beyond this many times the noise's: below 1e-6 a window by chance
-QUIETEST = (
-    3.0  # times the wander of the quietest window is the noise's: of white noise none in a million wanders by less
-)
+QUIETEST = 3.0  # times the wander of the quietest window: white noise has more in one of a million windows
 ONE_VALUE = 1e-9  # rad: wander of a window of equal rows, up to rounding
 SWAY_ANGLE = np.radians(1.0)  # amplitude from which an oscillation is called swaying
 TURN_RATE = np.radians(0.5)  # rad/s
