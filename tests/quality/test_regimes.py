@@ -29,6 +29,26 @@ def test_the_noise_estimate_is_the_noise():
     assert np.all((motion.angle_noise > 0.6 * 6e-4) & (motion.angle_noise < 1.05 * 6e-4))
 
 
+@pytest.mark.parametrize("arw", [1.5e-5, 9e-5])
+def test_rough_ground_is_not_the_noise_of_a_log_that_rests_little(arw):
+    """20 s of rest, and 280 s that shake as white noise does, 60 times as much as the gyros' own: no second of those is still."""
+    record = base(arw=arw, duration=300.0)
+    shaken = np.where(record.time > 20.0, 60.0 * arw / np.sqrt(record.interval), 0.0)
+    shake = shaken[:, None] * np.random.default_rng(3).standard_normal((len(record), 3))
+    motion = motion_summary(ImuRecord(record.time, record.gyro + shake, record.accel))
+    rests = motion.time <= 20.5
+    assert (motion.kind[rests] == 0).mean() > 0.9
+    assert not (motion.kind[~rests] == 0).any()
+    assert np.all(motion.angle_noise < 3.0 * arw)
+
+
+def test_an_axis_that_stands_on_one_value_shows_no_noise():
+    """A coarse gyro rests on one count for 15 s: what its counts wander by elsewhere is noise all the same."""
+    record = base(arw=6e-4, duration=300.0)
+    gyro = np.where((record.time < 15.0)[:, None], record.gyro[0], record.gyro)
+    assert motion_summary(ImuRecord(record.time, gyro, record.accel)).still_fraction == 1.0
+
+
 @pytest.mark.parametrize("arw", [1e-5, 6e-4])
 def test_small_motion_is_disturbance_and_large_motion_is_sway(arw):
     small = motion_summary(base(amplitude=(0.5, 0.3, 0.1), arw=arw))

@@ -44,6 +44,8 @@ STILL, DISTURBED, SWAYING, ROTATING, MOVING = range(5)
 
 TURN_WINDOW = 21  # s, odd; a sway cancels in it, a turn does not
 NOISE_FACTOR = 4.0  # wander beyond this many times the noise's: below 1e-6 a window by chance
+QUIETEST = 3.0  # times the wander of the quietest window: white noise has more in one of a million windows
+ONE_VALUE = 1e-9  # rad: wander of a window of equal rows, up to rounding
 SWAY_ANGLE = np.radians(1.0)  # amplitude from which an oscillation is called swaying
 TURN_RATE = np.radians(0.5)  # rad/s
 TURN_ANGLE = np.radians(3.0)  # net angle from which a turn is called rotating
@@ -107,7 +109,8 @@ class MotionSummary:
     rate_bias : (3,) array, rad/s
         What was taken out (sensor bias and earth rate).
     angle_noise : (3,) array, rad/sqrt(s)
-        Angle random walk of the quiet quarter of the record; vibration above 2 Hz counts as noise.
+        Angle random walk of the quiet quarter of the record, or of its quietest 10 s where that is less; vibration above 2 Hz
+        counts as noise.
     regimes : tuple of Regime
         Stretches in order, without holes.
     """
@@ -208,8 +211,8 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     rates = rates[:, : seconds * per_second]
 
     noise = white_noise(record)
-    angle_noise, force_noise = noise[:3], noise[3:]
     wander = angle_wander(rates[:3], interval, per_second)  # (3, windows), of each window of up to 10 s
+    angle_noise, force_noise = _no_motion(noise[:3], wander, seconds), noise[3:]
     bias = rate_bias(rates[:3], wander, per_second, angle_noise)
     force = second_means(rates[3:], per_second)
     still_gravity = bias_by_gravity(second_means(rates[:3], per_second), force)
@@ -220,7 +223,7 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     motion, gain = acceleration(second_means(steady, per_second), force)
 
     turned = np.minimum(1.0, np.linalg.norm(box_mean(rate, LEVEL_WINDOW), axis=0) * LEVEL_WINDOW)
-    walked = angle_noise[:, None] * np.sqrt(min(WINDOW, seconds) / 15.0)  # detrended random walk: N^2 T / 15
+    walked = angle_noise[:, None] * _walk(seconds)
     active = np.any(wander > np.hypot(STILL_ANGLE, NOISE_FACTOR * walked), axis=0)
     around = wander.max(axis=0)[offset(seconds, seconds - wander.shape[1] + 1)]
     noisy = length_of(force_noise)
@@ -236,6 +239,21 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     )
     time = record.time[0] - record.interval + per_second * interval * np.arange(1, seconds + 1)
     return MotionSummary(time, kind, rate.T, force.T, motion, around, bias, angle_noise, _stretches(time, kind, record))
+
+
+def _walk(seconds: int) -> float:
+    """RMS wander of a window by white noise of 1 rad/sqrt(s): a detrended random walk has ``N^2 T / 15``."""
+    return float(np.sqrt(min(WINDOW, seconds) / 15.0))
+
+
+def _no_motion(angle_noise: Array, wander: Array, seconds: int) -> Array:
+    """(3,) white noise that leaves a window as quiet as the quietest one.
+
+    The quiet quarter of a log that rests less than a quarter is in motion, and rough ground or steps look white. A sensor's noise
+    is there at rest, too. An axis that stands on one value for a window is coarse, or stuck, and shows no noise.
+    """
+    quietest = wander.min(axis=1)
+    return np.where(quietest > ONE_VALUE, np.minimum(angle_noise, QUIETEST * quietest / _walk(seconds)), angle_noise)
 
 
 def _unknown(record: ImuRecord) -> MotionSummary:
