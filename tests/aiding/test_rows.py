@@ -84,7 +84,9 @@ def _predicted(kind, dx):
     ]  # not by what the state is off: a bias times a compliance is of the second order
     m.means.vectors[2] = W_B + dx[BG] + dx[model.layout.slice_of("slow gyro bias")]
     w, now, R = workspace(padded(n), 3), np.zeros(NOW_LENGTH), np.ones(3)
-    compiled_model = Model(model.dynamics, model.sensor_states, False, 0.0, 0.0, False, True, False)
+    compiled_model = Model(
+        model.dynamics, model.sensor_states, False, 0.0, 0.0, 0, np.zeros(0, dtype=np.int64), True, False
+    )
     describe(m, compiled_model, now)
     measure(m, compiled_model, kernel_sources([source], model), 0, source.measured[0].copy(), now, w, R)
     return w.z.copy(), w.H[:, :n].copy(), n
@@ -200,7 +202,7 @@ def test_scale_and_axes_of_gyros_are_in_the_swing_of_a_sensor_on_its_arm(kind):
     model = with_states(replace(MODEL, groups=(*MODEL.groups, gyro_axes(imu_spec("consumer")))), [source])
     axes, n = model.layout.slice_of(GYRO_AXES), model.states
     s = wander.state_at(dcm_from_euler(0.4, 0.1, -0.2), [60.0, 30.0, 2.0], LAT, LON, ALT)
-    of = Model(model.dynamics, model.sensor_states, False, 0.0, 0.0, False, True, False)
+    of = Model(model.dynamics, model.sensor_states, False, 0.0, 0.0, 0, -1, True, False)
     assert of.sensors[2] == axes.start
 
     def row(w_b, M, noise=0.0):

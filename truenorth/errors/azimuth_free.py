@@ -15,8 +15,9 @@ that is seen stays the same, not along its tangent,
     v <- exp([psi u x]) (v - xi),                       xi = dv_hat + psi u x v
     b <- b + eta + C' (w_ie - exp([-psi u x]) w_ie),    eta = eps_hat - psi C' (u x w_ie)
 
-and the covariance follows: ``psi, xi, eta`` are what they were, along axes that have turned. Level errors turn with the body, so
-that what they and the biases of accelerometers have to do with each other stays the same, too.
+and the covariance follows: ``psi, xi, eta`` are what they were, along axes that have turned. A log in the water shows ``v + d``
+with its drift `d`, the current's opposite: in the place of v this sum turns, and d, along east and north, stays. Level errors
+turn with the body, so that what they and the biases of accelerometers have to do with each other stays the same, too.
 
 The logarithm of :mod:`truenorth.errors.invariant` is straight where velocity is known over the ground; here the body knows it.
 
@@ -60,29 +61,45 @@ def _attitude_after(q: Any, x: Any) -> Any:
 
 
 @borrowing
-def _velocity_after(v: Any, x: Any) -> Any:
-    """The velocity once a correction is made, tuples."""
-    psi = x[_PHI + 2]
-    return _turned(psi, (v[0] - x[_DV] + psi * v[1], v[1] - x[_DV + 1] - psi * v[0], v[2] - x[_DV + 2]))
-
-
-@borrowing
 def _earth_rate(s: Any) -> Any:
     axis = earth_axis(s)
     return EARTH_RATE * axis[0], EARTH_RATE * axis[1], EARTH_RATE * axis[2]
 
 
 @borrowing
-def carry(s: Any, x: Any, e: Any) -> None:
-    """Turn errors `e` (n,) beyond a correction into those left after it, in place; `s` and `x` are those before it."""
-    q, v, psi = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6]), x[_PHI + 2]
-    after, v_after = _attitude_after(q, x), _velocity_after(v, x)
-    w = _earth_rate(s)
-    p = e[_PHI + 2]
-    xi = _turned(psi, (e[_DV] - p * v[1], e[_DV + 1] + p * v[0], e[_DV + 2]))
+def _drift_of(w: Any, values: Any, at: int) -> Any:
+    """A drift east and north, or its error, along the axes of the loop; `w` the earth's rate, `at` its first state, or -1."""
+    if at < 0:
+        return 0.0, 0.0, 0.0
+    level = math.hypot(w[0], w[1])
+    s, c = w[0] / level, w[1] / level
+    return c * values[at] + s * values[at + 1], -s * values[at] + c * values[at + 1], 0.0
+
+
+@borrowing
+def _shown(v: Any, d: Any) -> Any:
+    """The velocity that a log shows, tuples."""
+    return v[0] + d[0], v[1] + d[1], v[2]
+
+
+@borrowing
+def _shown_after(shown: Any, x: Any, off: Any) -> Any:
+    """That velocity once a correction is made; `off` is the one of the drift; tuples."""
+    psi, xi = x[_PHI + 2], (x[_DV] - off[0], x[_DV + 1] - off[1], x[_DV + 2])
+    return _turned(psi, (shown[0] - xi[0] + psi * shown[1], shown[1] - xi[1] - psi * shown[0], shown[2] - xi[2]))
+
+
+@borrowing
+def carry(s: Any, x: Any, aux: Any, drift: int, e: Any) -> None:
+    """Turn errors `e` (n,) beyond a correction into those left after it, in place; the others as of :func:`reset`, before it."""
+    q, psi, w = (s[0], s[1], s[2], s[3]), x[_PHI + 2], _earth_rate(s)
+    after, shown = _attitude_after(q, x), _shown((s[4], s[5], s[6]), _drift_of(w, aux, drift))
+    shown_after = _shown_after(shown, x, _drift_of(w, x, drift))
+    p, d = e[_PHI + 2], _drift_of(w, e, drift)
+    xi = _turned(psi, (e[_DV] - d[0] - p * shown[1], e[_DV + 1] - d[1] + p * shown[0], e[_DV + 2]))
     was, now = _back(q, (-w[1], w[0], 0.0)), _back(after, (-w[1], w[0], 0.0))
     e[_PHI], e[_PHI + 1], _ = _turned(psi, (e[_PHI], e[_PHI + 1], p))
-    e[_DV], e[_DV + 1] = xi[0] + p * v_after[1], xi[1] - p * v_after[0]
+    e[_DV], e[_DV + 1] = xi[0] + p * shown_after[1] + d[0], xi[1] - p * shown_after[0] + d[1]
     for i in range(3):
         e[_BG + i] += p * (now[i] - was[i])
 
@@ -95,7 +112,7 @@ def _transpose(M: Any) -> None:
 
 
 @borrowing
-def reset(s: Any, x: Any, P: Any) -> None:
+def reset(s: Any, x: Any, aux: Any, drift: int, P: Any) -> None:
     """Prepare a correction for being fed back along the curve on which the body's sensors see the same.
 
     Parameters
@@ -104,31 +121,35 @@ def reset(s: Any, x: Any, P: Any) -> None:
         The state before the correction, see :mod:`truenorth.strapdown.wander`.
     x : (n,) array
         The estimated errors; those of attitude, velocity and gyro bias become what takes them where they belong.
+    aux : (n,) array
+        What is assumed of the sensors, each in its state's place.
+    drift : int
+        First state of a log's drift along east and north; -1 where it has none.
     P : (N, N) array
         Their covariance, carried to the errors left.
     """
     for _ in range(2):  # the rows of P, then those of (P D')': D P D'
         for j in range(P.shape[0]):
-            carry(s, x, P[j])
+            carry(s, x, aux, drift, P[j])
         _transpose(P)
     for i in range(P.shape[0]):
         for j in range(i):
             P[j, i] = P[i, j]
-    q, v, psi = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6]), x[_PHI + 2]
-    w, v_after, after = _earth_rate(s), _velocity_after(v, x), _attitude_after(q, x)
-    seen = _turned(-psi, w)
+    q, v, psi, w = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6]), x[_PHI + 2], _earth_rate(s)
+    d, off, after = _drift_of(w, aux, drift), _drift_of(w, x, drift), _attitude_after(q, x)
+    shown_after, seen = _shown_after(_shown(v, d), x, off), _turned(-psi, w)
     chord = _back(q, (w[0] - seen[0] + psi * w[1], w[1] - seen[1] - psi * w[0], 0.0))
     for i in range(3):
-        x[_DV + i] = v[i] - v_after[i]
+        x[_DV + i] = v[i] - (shown_after[i] - d[i] - off[i])
         x[_BG + i] += chord[i]
     x[_PHI], x[_PHI + 1], x[_PHI + 2] = rotation_vector_of(quaternion_product(after, (q[0], -q[1], -q[2], -q[3])))
 
 
 @borrowing
-def keep_reset(s: Any, x: Any, D: Any) -> None:
+def keep_reset(s: Any, x: Any, aux: Any, drift: int, D: Any) -> None:
     """Fill in `D` (n, n), by which :func:`reset` will carry errors to those that are left."""
     for j in range(len(D)):
         for i in range(len(D)):
             D[j, i] = 1.0 * (i == j)
-        carry(s, x, D[j])
+        carry(s, x, aux, drift, D[j])
     _transpose(D)

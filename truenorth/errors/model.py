@@ -16,6 +16,7 @@ from truenorth.errors.dynamics import Dynamics, couple_pairs, dynamics_of, noise
 from truenorth.errors.group import Group, columns_at
 from truenorth.errors.ins import TURN_TIME, couple_sensors, error_dynamics, transition
 from truenorth.errors.intervals import Intervals
+from truenorth.errors.log import DRIFT
 from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, DV, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
@@ -90,6 +91,11 @@ class InsModel(Walks):
     def sensor_states(self) -> NDArray[np.int64]:
         """(3,) first states of the slow biases, for which :func:`couple_sensors` asks, and of the gyros' axes; -1: none."""
         return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL, GYRO_AXES)])
+
+    @property
+    def drift_state(self) -> int:
+        """First state of a log's drift along east and north; -1 where it has none."""
+        return self.layout.first_of(DRIFT)
 
     @cached_property
     def dynamics(self) -> Dynamics:

@@ -169,8 +169,8 @@ def correct(
         return SOUND
     if model.invariant == IN_BODY:
         if smoothing:
-            azimuth_free.keep_reset(m.s, w.x, kept.D[link])
-        azimuth_free.reset(m.s, w.x, w.P)
+            azimuth_free.keep_reset(m.s, w.x, m.aux, model.drift, kept.D[link])
+        azimuth_free.reset(m.s, w.x, m.aux, model.drift, w.P)
     elif model.invariant == OVER_GROUND:
         if smoothing:
             invariant.keep_reset(m.s, w.x, model.fixed_altitude, kept.D[link])

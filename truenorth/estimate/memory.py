@@ -73,6 +73,7 @@ class Model(NamedTuple):
     turn_scale: float
     turn_cross: float
     invariant: int  # how a correction is fed back
+    drift: int  # first state of a log's drift along east and north, or -1
     covariance: bool
     held: bool
     spare: float = 0.0

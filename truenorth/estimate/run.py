@@ -195,10 +195,8 @@ def navigate_track(
         Of the filter's prediction; forces and turns within it are integrated sample by sample.
     every : int
         Output at every so many intervals.
-    covariance : bool
-        Carry the covariance; needed for any aiding.
-    smooth : bool
-        Smooth over the whole log (Rauch, Tung, Striebel).
+    covariance, smooth : bool
+        Carry the covariance, which any aiding needs; smooth over the whole log (Rauch, Tung, Striebel).
     invariant : {AS_IT_IS, OVER_GROUND, IN_BODY} of :mod:`truenorth.estimate.memory`: how a correction is fed back
     prior, off : (P, values) and (n,) array, optional
         Of all states, and of an open loop: see :func:`begin`.
@@ -265,6 +263,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         model.fixed_altitude,
         *model.turn_noise,
         int(setting.invariant),
+        model.drift_state,
         setting.covariance,
         any(group.considered for group in model.groups),
         setting.spare(state.interval),

@@ -67,7 +67,7 @@ def smoothed(plan: Events, kept: Kept, P0: Array, model: Model) -> tuple[Array, 
     full[:, : state.shape[1]] = state
     for k in range(len(state)):
         if model.invariant == IN_BODY:
-            azimuth_free.reset(full[k], left[k], P[k])
+            azimuth_free.reset(full[k], left[k], sensors[k], model.drift, P[k])
         elif model.invariant == OVER_GROUND:
             invariant.reset(full[k], left[k], P[k], model.fixed_altitude)
         feed_back(full[k], sensors[k], left[k], model.dynamics.turns)

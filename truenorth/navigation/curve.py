@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,43 +41,62 @@ def seen_in_body(aiding: Sequence[Aiding]) -> bool:
     return in_body and not any(source.over_ground for source in aiding)
 
 
-def with_curve(track: Track, aiding: Sequence[Aiding], before: Track | None = None) -> Track:
+class Sums(NamedTuple):
+    """What has come up to an epoch: of each of `_rates` what it was there, and its integral."""
+
+    time: float
+    rates: Array
+    sums: Array
+
+
+def with_curve(track: Track, aiding: Sequence[Aiding], before: Track | None = None, since: Sums | None = None) -> Track:
     """The track with what the curve of its velocity adds to the covariance of velocity and place, where it is seen in the body.
 
     Parameters
     ----------
     track : Track
-        From its start on.
+        From its start on, or from what came before it.
     aiding : sequence of Aiding
         Its measurements; where one of them shows velocity or place over the ground, or none velocity, the track is what it was.
     before : Track, optional
         The same epochs as filtered, of a track that is smoothed: place was corrected by what heading was off before.
+    since : Sums, optional
+        Of the epochs before.
     """
     if not seen_in_body(aiding) or not len(track.P):
         return track
-    off, _ = _off(track)
-    filtered = track if before is None else before
-    way, aside = (_summed(x, track.time) for x in _off(filtered))
-    lost = _summed(np.linalg.norm(filtered.v_n[:, :2], axis=1) * (MOST * filtered.sigma[:, 2] > TURN), track.time) / 2.0
+    sums = _summed(track if before is None else before, since)
     n = track.P.shape[:2]
     along, across = np.zeros(n), np.zeros(n)
-    along[:, DV], along[:, DP], across[:, DP] = off, way, aside
+    along[:, DV], along[:, DP], across[:, DP] = _rates(track)[:, :3], sums[:, :3], sums[:, 3:6]
     P = track.P + sum(x[:, :, None] * x[:, None, :] for x in (along, across))
     for j in range(DP.start, DP.start + 2):
-        P[:, j, j] += lost**2
+        P[:, j, j] += sums[:, 6] ** 2
     return replace(track, P=P)
 
 
-def _off(track: Track) -> tuple[Array, Array]:
-    """(K, 3) m/s, by which a velocity is off along and across the way beyond what its covariance says."""
+def sums_after(track: Track, since: Sums | None) -> Sums | None:
+    """What has come up to the last epoch of a track; `since`: up to its first one."""
+    if not len(track):
+        return since
+    return Sums(float(track.time[-1]), _rates(track[-1:])[0], _summed(track, since)[-1])
+
+
+def _rates(track: Track) -> Array:
+    """(K, 7) m/s: what the covariance does not say of a velocity along and across the way, and by what place is lost."""
     sigma = np.maximum(track.sigma[:, 2], 1e-12)
     k = np.minimum(MOST, TURN / sigma)
     level = track.v_n * [1.0, 1.0, 0.0]
     along, across = (1.0 - np.cos(k * sigma)) / k, sigma - np.sin(MOST * sigma) / MOST
-    return level * along[:, None], np.cross([0.0, 0.0, 1.0], level) * across[:, None]
+    aside = np.cross([0.0, 0.0, 1.0], level)
+    lost = 0.5 * np.linalg.norm(level, axis=1) * (MOST * sigma > TURN)
+    return np.column_stack([level * along[:, None], aside * across[:, None], lost])
 
 
-def _summed(rate: Array, time: Array) -> Array:
-    """Its integral from the first epoch on, along the first axis (K, ..)."""
-    steps = 0.5 * ((rate[1:] + rate[:-1]).T * np.diff(time)).T
-    return np.concatenate([np.zeros_like(rate[:1]), np.cumsum(steps, axis=0)])
+def _summed(track: Track, since: Sums | None) -> Array:
+    """(K, 7) integrals of the rates from the first epoch on, or since an earlier one."""
+    rates, time = _rates(track), track.time
+    first = Sums(float(time[0]), rates[0], np.zeros(rates.shape[1])) if since is None else since
+    rates, time = np.vstack([first.rates, rates]), np.append(first.time, time)
+    steps = 0.5 * (rates[1:] + rates[:-1]) * np.diff(time)[:, None]
+    return np.asarray(first.sums + np.cumsum(steps, axis=0))

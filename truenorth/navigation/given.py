@@ -14,6 +14,7 @@ from truenorth.aiding.source import Aiding
 from truenorth.alignment.unsaid import unsaid_evidence
 from truenorth.core.errors import UsageError
 from truenorth.estimate.memory import IN_BODY, OVER_GROUND
+from truenorth.navigation.curve import seen_in_body
 from truenorth.navigation.result import Altitude
 from truenorth.records import Late
 from truenorth.records.specs import ImuSpec
@@ -170,7 +171,7 @@ def fed_back(aiding: Sequence[Aiding]) -> int:
 
     The biases of cheap gyros turn a heading by tens of degrees before turns have shown them. A correction as large, taken off
     attitude and velocity each by itself, leaves errors between which the covariance knows no correlation: of consumer IMUs on
-    ships the level was 1.3 to 1.5 sigmas off, RMS, 7.7 at the worst of 40; so 1.1 and 4.4. Where nothing shows velocity or place
-    over the ground, the filter then seems to see the heading: industrial IMUs with a log were 8.6 sigmas off, RMS.
+    ships the level was 1.3 to 1.5 sigmas off, RMS, 7.7 at the worst of 40; so 1.1 and 4.4. Where velocity is seen in the
+    body alone, the filter then seems to see the heading: industrial IMUs with a log were 8.6 sigmas off, RMS.
     """
-    return OVER_GROUND if any(source.over_ground for source in aiding) else IN_BODY
+    return IN_BODY if seen_in_body(aiding) else OVER_GROUND
