@@ -128,6 +128,23 @@ def test_distance_and_speed_of_an_odometer():
     np.testing.assert_allclose(speeds.distance, [3.0, 3.0, 10.0])  # of the nominal interval of 1.5 s, then trapezia
 
 
+@pytest.mark.parametrize(("kind", "size"), [("distance", None), ("pulses", 0.05)])
+def test_counts_from_the_start_are_no_counts_of_each_interval(kind, size):
+    """A car that stands, drives and backs up; of a log of its way the speeds were thousands of m/s, and the solution ran away."""
+    time = 0.1 * np.arange(2000)
+    way = np.where(time > 60.0, 12.0 * np.sin(0.02 * (time - 60.0)), 0.0) * 0.1 / (size or 1.0)
+    way[[500, 700]] = 1e4  # two rows that a fault of the counter has spoilt
+    assert len(OdometerRecord(time, way, kind, size)) == len(time)
+    way[[500, 700]] = 0.0
+    for start in (0.0, 1e6):
+        total = start + np.cumsum(way)
+        row = 1 + np.argmax(np.abs(total * (size or 1.0)) > 40.0)
+        with pytest.raises(
+            DataError, match=rf"row {row}, column {kind}: .* counted from the start: call the column {kind}_total"
+        ):
+            OdometerRecord(time, total, kind, size)
+
+
 MOTION = Sway(
     Position.from_degrees(60.0, 179.9999, 50.0),
     heading_tones=(Tone(0.3, 20.0, 0.4),),

@@ -174,6 +174,39 @@ def test_a_cheap_gyro_bias_is_not_called_a_unit():
     assert "gyro_unit" not in codes(inspect(ImuRecord(record.time, record.gyro + bias, record.accel)))
 
 
+def rocks_on_an_arm(height, frequencies=(0.22, 0.4, 0.55)):
+    """A truck that rocks by .3 deg about an axis so far below its IMU (m): what gravity swings by is mostly acceleration."""
+    time, rng = 0.01 * np.arange(20000), np.random.default_rng(8)
+    gyro, accel = 1e-5 * rng.standard_normal((len(time), 3)), 1e-3 * rng.standard_normal((len(time), 3))
+    accel[:, 2] += G
+    for axis, forward in ((0, 1), (1, 0)):  # pitch swings the force along y, roll that along x
+        sign = 1.0 if axis == 0 else -1.0
+        for f in frequencies:
+            w, phase = 2.0 * np.pi * f, rng.uniform(0.0, 6.0)
+            angle = np.radians(0.25) * np.sin(w * time + phase)
+            gyro[:, axis] += np.radians(0.25) * w * np.cos(w * time + phase)
+            accel[:, forward] += sign * (G + height * w**2) * angle
+    return ImuRecord(time, gyro, accel)
+
+
+@pytest.mark.parametrize("height", [2.5, 5.0, -8.0])
+def test_an_arm_is_no_unit_of_the_gyros_nor_are_axes_wrong(height):
+    record = rocks_on_an_arm(height)
+    found = inspect(record)
+    assert found.overall in ("disturbed", "moving")  # of a base that sways no unit is asked
+    assert not abs(found.turning.scale - 1.0) < 0.35  # without the arm: another unit, or another sign
+    assert not codes(found) & {"gyro_axes", "gyro_unit", "gyro_scale"}
+    assert tn.align(record, Position(LAT), imu="tactical").status == "level_only"
+
+
+@pytest.mark.parametrize("factor", [0.43, np.degrees(1.0)])
+def test_a_unit_shows_on_an_arm(factor):
+    found = inspect(changed(rocks_on_an_arm(2.5), gyro=factor))
+    assert found.turning.arm_scale == pytest.approx(factor, rel=0.05)
+    assert "gyro_unit" in codes(found, "error")
+    assert f"{found.turning.arm_scale:.3g} times" in next(f.message for f in found.findings if f.code == "gyro_unit")
+
+
 @pytest.mark.parametrize("seed", some([0], [1]))
 def test_every_mix_of_gyro_axes_is_noticed(seed):
     """All 47 wrong signed permutations, and the right one; motion about all axes on a tilted mounting."""

@@ -161,7 +161,9 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
     if not np.isfinite(turning.best_agreement) or turning.best_agreement < AGREES:
         return False
     unexplained = max(0.05, limit("other reading") * (1.0 - turning.best_agreement))
-    if 1.0 - turning.agreement > unexplained:
+    if (
+        1.0 - max(turning.agreement, turning.arm_unscaled) > unexplained
+    ):  # below its axis an IMU feels the base lean the other way
         findings.append(
             Finding(
                 "error",
@@ -171,16 +173,21 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
             )
         )
         return True
-    if turning.agreement < AGREES or abs(turning.scale - 1.0) < limit("scale by tilt"):
+    off = min(abs(scale - 1.0) for scale in (turning.scale, turning.arm_scale)) >= limit("scale by tilt")
+    far_better = 1.0 - turning.arm_unscaled > limit("other reading") * (
+        1.0 - turning.arm_agreement
+    )  # than gyros on an arm alone
+    if turning.agreement < AGREES or not (off and far_better):
         return turning.agreement >= AGREES
-    found = f"the gyros turn {turning.scale:.3g} times as far as gravity in the accelerometers; expected 1"
+    scale = turning.arm_scale
+    found = f"the gyros turn {scale:.3g} times as far as gravity in the accelerometers; expected 1"
     readings = [(1.0 / DEG, "in deg/s"), (3600.0 / DEG, "in deg/h"), (1000.0, "in mrad/s")]
     for factor, unit in readings:
-        if abs(turning.scale / factor - 1.0) < 0.1:
+        if abs(scale / factor - 1.0) < 0.1:
             text = f"{found}: the values look {unit}, not rad/s; use `units`, or convert them"
             findings.append(Finding("error", "gyro_unit", text))
             return True
-    severity, code = ("error", "gyro_unit") if not 0.5 < turning.scale < 2.0 else ("warning", "gyro_scale")
+    severity, code = ("error", "gyro_unit") if not 0.5 < scale < 2.0 else ("warning", "gyro_scale")
     text = f"{found}: unit (increments read as rates?) or scale factor of the gyros are wrong"
     findings.append(Finding(severity, code, text))  # type: ignore[arg-type]
     return True

@@ -15,6 +15,8 @@ from truenorth.records.base import Record
 
 Array = NDArray[np.float64]
 KINDS = ("distance", "pulses", "speed")
+FASTEST = 400.0  # m/s: no wheel has turned as fast
+SPIKES = 0.01  # share of rows that may be faster, by faults of the counter
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,7 +39,8 @@ class OdometerRecord(Record):
     Raises
     ------
     DataError
-        As for :class:`ImuRecord`; pulses without a size, or a negative value where reverse has no sign.
+        As for :class:`ImuRecord`; pulses without a size, a negative value where reverse has no sign, or counts from the start in
+        the place of those of each interval.
     """
 
     time: Array
@@ -68,6 +71,20 @@ class OdometerRecord(Record):
             raise DataError(
                 f"{self.source}: row {bad[0] + 1}, column {self.groups()['values'][0]}: {self.values[bad[0]]:g}; expected no "
                 "negative value where reverse driving has no sign: leave signed True"
+            )
+        if self.kind != "speed" and len(self) > 1:
+            self._check_intervals()
+
+    def _check_intervals(self) -> None:
+        """Refuse a running total: no wheel is as fast as its values say, and their differences are those of a wheel."""
+        fast = np.abs(self.speed) > FASTEST
+        jumps = np.abs(np.diff(self.distance)) > FASTEST * self.steps[1:]
+        if np.mean(fast) > max(SPIKES, 10.0 * float(np.mean(jumps))):
+            row, column = int(np.argmax(fast)), self.groups()["values"][0]
+            raise DataError(
+                f"{self.source}: row {row + 1}, column {column}: {self.values[row]:g} within {self.steps[row]:.3g} s would be "
+                f"{abs(self.speed[row]):.4g} m/s; expected what is counted in the interval that ends at each row: these values are "
+                f"counted from the start: call the column {self.kind}_total, or hand in their differences"
             )
 
     @cached_property
