@@ -151,7 +151,7 @@ class Aiding:
     def over_ground(self) -> bool:
         """Whether it shows velocity or place along east and north, which turn with the azimuth; that nothing moves does not."""
         along = self.row.axes == LEVEL_FRAME and self.row.unit in ("m", "m/s") and self.does == "measurement"
-        return along and not (len(self.time) > 0 and not self.measured.any())
+        return along and not (len(self.time) > 0 and not np.nan_to_num(self.measured).any())
 
     def gates(self) -> Array:
         """(3,) limits of the normalised innovation squared of one, two and three rows."""

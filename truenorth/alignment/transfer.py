@@ -32,7 +32,7 @@ from truenorth.core.position import Position
 from truenorth.errors.group import Group
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
-from truenorth.estimate.poorer import BIASES, KINDS, poorer_rivals, poorer_tracks
+from truenorth.estimate.poorer import BIASES, SLOW, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, likelihood_ratio, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.estimate.spiked import spike_evidence
@@ -284,7 +284,7 @@ def _rivals(
         track = other(model)
 
     def of_another_course() -> list[Rival]:
-        poorer = poorer_rivals(track, poorer_tracks(of_another_imu, track, spec, KINDS | BIASES))
+        poorer = poorer_rivals(track, poorer_tracks(of_another_imu, track, spec, SLOW | BIASES))
         return warming_rivals(partial(run, model=model, start=start), track, part, spec) + poorer
 
     found = noise_evidence(other, track, model, part)

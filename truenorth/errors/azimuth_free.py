@@ -35,15 +35,15 @@ from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_
 from truenorth.core.compiled import borrowing
 from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.invariant import rotation_vector_of
-from truenorth.strapdown.wander import earth_axis
+from truenorth.strapdown.wander import azimuth, earth_axis
 
 _PHI, _DV, _BG = 0, 3, 9
 
 
 @borrowing
-def _turned(azimuth: float, v: Any) -> Any:
+def _turned(psi: float, v: Any) -> Any:
     """``exp([psi u x]) v``; tuples."""
-    s, c = math.sin(azimuth), math.cos(azimuth)
+    s, c = math.sin(psi), math.cos(psi)
     return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
 
 
@@ -67,12 +67,11 @@ def _earth_rate(s: Any) -> Any:
 
 
 @borrowing
-def _drift_of(w: Any, values: Any, at: int) -> Any:
-    """A drift east and north, or its error, along the axes of the loop; `w` the earth's rate, `at` its first state, or -1."""
+def _drift_of(state: Any, values: Any, at: int) -> Any:
+    """A drift east and north, or its error, along the axes of the loop, tuples; `at` is its first state, or -1."""
     if at < 0:
         return 0.0, 0.0, 0.0
-    level = math.hypot(w[0], w[1])
-    s, c = w[0] / level, w[1] / level
+    s, c = azimuth(state)
     return c * values[at] + s * values[at + 1], -s * values[at] + c * values[at + 1], 0.0
 
 
@@ -93,9 +92,9 @@ def _shown_after(shown: Any, x: Any, off: Any) -> Any:
 def carry(s: Any, x: Any, aux: Any, drift: int, e: Any) -> None:
     """Turn errors `e` (n,) beyond a correction into those left after it, in place; the others as of :func:`reset`, before it."""
     q, psi, w = (s[0], s[1], s[2], s[3]), x[_PHI + 2], _earth_rate(s)
-    after, shown = _attitude_after(q, x), _shown((s[4], s[5], s[6]), _drift_of(w, aux, drift))
-    shown_after = _shown_after(shown, x, _drift_of(w, x, drift))
-    p, d = e[_PHI + 2], _drift_of(w, e, drift)
+    after, shown = _attitude_after(q, x), _shown((s[4], s[5], s[6]), _drift_of(s, aux, drift))
+    shown_after = _shown_after(shown, x, _drift_of(s, x, drift))
+    p, d = e[_PHI + 2], _drift_of(s, e, drift)
     xi = _turned(psi, (e[_DV] - d[0] - p * shown[1], e[_DV + 1] - d[1] + p * shown[0], e[_DV + 2]))
     was, now = _back(q, (-w[1], w[0], 0.0)), _back(after, (-w[1], w[0], 0.0))
     e[_PHI], e[_PHI + 1], _ = _turned(psi, (e[_PHI], e[_PHI + 1], p))
@@ -136,7 +135,7 @@ def reset(s: Any, x: Any, aux: Any, drift: int, P: Any) -> None:
         for j in range(i):
             P[j, i] = P[i, j]
     q, v, psi, w = (s[0], s[1], s[2], s[3]), (s[4], s[5], s[6]), x[_PHI + 2], _earth_rate(s)
-    d, off, after = _drift_of(w, aux, drift), _drift_of(w, x, drift), _attitude_after(q, x)
+    d, off, after = _drift_of(s, aux, drift), _drift_of(s, x, drift), _attitude_after(q, x)
     shown_after, seen = _shown_after(_shown(v, d), x, off), _turned(-psi, w)
     chord = _back(q, (w[0] - seen[0] + psi * w[1], w[1] - seen[1] - psi * w[0], 0.0))
     for i in range(3):

@@ -43,6 +43,8 @@ FIELDS = ("bias", "turn_on_bias", "random_walk", "bias_instability", "rate_rando
 # the prior that a log shows whole, ``(1 - 1/9) chi_3^2 - 6 ln 3`` exceeds 10; of fewer, of more and of larger factors more seldom.
 ALONE = {"rival.scale_factors": ("scale_factor", "scale_factor_asymmetry"), "rival.misalignments": ("misalignment",)}
 KINDS = {"rival.poorer": FIELDS, **ALONE}
+# Of a slave: on a straight flight its gyros' rates are their noise, and a scale factor of -1 would take that out.
+SLOW: dict[str, tuple[str, ...]] = {"rival.poorer": ("bias", "turn_on_bias", "bias_instability", "rate_random_walk")}
 # Where the earth's rate tells heading, a gyro's bias turns it: gyros that feel force, or are warmer than when they were calibrated,
 # have larger ones, and are no noisier.
 SENSORS = ("gyro_", "accel_")
