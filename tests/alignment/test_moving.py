@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from truenorth.alignment.moving import Moving
-from truenorth.core.attitude import dcm_from_rotation_vector
-from truenorth.core.earth import radii
-from truenorth.state.layout import DP, DV, PHI
+from truenorth.core.attitude import dcm_from_rotation_vector, skew
+from truenorth.core.earth import EARTH_RATE, radii
+from truenorth.state.layout import BG, DP, DV, PHI
 
 V, WAY = np.array([3.0, -8.0, 0.5]), np.array([900.0, -1400.0])
 
@@ -24,12 +24,13 @@ def at_the_end(sigma):
     column[PHI.stop - 1] = 1.0
     column[DV][:2], column[DP][:2] = (V[1], -V[0]), (WAY[1], -WAY[0])
     P = sigma**2 * np.outer(column, column)
-    return Moving(V, P, 0.0, "motion", {}, None, 0.0, sigma, SimpleNamespace(position=place))
+    track = SimpleNamespace(position=place, C_nb=[dcm_from_rotation_vector(np.array([0.02, -0.03, 0.7]))])
+    return Moving(V, P, 0.0, "motion", {}, None, 0.0, sigma, track)
 
 
 @pytest.mark.parametrize(("own", "more"), [(0.02, 0.0), (0.02, 0.1), (0.1, 0.4), (0.05, 1.8)])
 def test_velocity_and_way_turn_with_a_heading_that_is_less_sure(own, more):
-    """Mean squares of their errors over headings drawn with that sigma, to 5 %; of heading itself, and of one with the other."""
+    """No less than the mean squares of their errors over headings drawn with that sigma; 5 % more, as long as it is small."""
     known = at_the_end(own).turned(more**2)
     phi = np.hypot(own, more) * np.random.default_rng(1).standard_normal(40_000)
     C = dcm_from_rotation_vector(-phi[:, None] * [0.0, 0.0, 1.0])
@@ -39,7 +40,33 @@ def test_velocity_and_way_turn_with_a_heading_that_is_less_sure(own, more):
     for part, error in ((DV, dv), (DP, dp)):
         found = known.P[part, part][:2, :2]
         true = error[:, :2].T @ error[:, :2] / len(error)
-        assert np.abs(found - true).max() < 0.05 * np.trace(true)
+        assert np.linalg.eigvalsh(found - true).min() > -0.05 * np.trace(true)
+        assert more > 0.1 or np.abs(found - true).max() < 0.05 * np.trace(true)
     assert known.P[2, 2] == pytest.approx(own**2 + more**2)
     assert np.linalg.eigvalsh(known.P).min() > -1e-9 * np.trace(known.P)
     assert known.P[5, 5] == 0.0
+
+
+def test_what_a_heading_that_is_less_sure_goes_with_is_seen_by_no_sensor_in_the_body():
+    """Neither the log, ``C'(dv + v x phi)``, nor the gyros of known bias, by the earth's rate: both would narrow it again."""
+    before = at_the_end(0.02)
+    known = before.turned(0.6**2)
+    C = known.track.C_nb[0]
+    w = EARTH_RATE * np.array([0.0, math.cos(0.8), math.sin(0.8)])
+    sees = np.zeros((6, 15))
+    sees[:3, DV], sees[:3, PHI] = C.T, -C.T @ skew(V)
+    sees[3:, BG], sees[3:, PHI] = np.eye(3), C.T @ skew(w)
+    turn = known.turn
+    np.testing.assert_allclose(sees @ turn, np.zeros(6), atol=1e-12)
+    for later in (known, known.less_sure(0.1**2)):
+        assert later.P[2, 2] > 0.6**2
+        beyond = later.P - later.P[2, 2] * np.outer(turn, turn)
+        np.testing.assert_allclose(beyond[PHI.stop - 1], np.zeros(15), atol=2e-3 * np.abs(later.P).max())
+
+
+def test_a_larger_sigma_of_velocity_is_an_error_of_its_own():
+    known = at_the_end(0.02).turned(0.6**2)
+    larger = known.less_sure(0.0, velocity=1.3, position=1.2)
+    np.testing.assert_allclose(np.diag(larger.P)[DV], 1.3**2 * np.diag(known.P)[DV])
+    np.testing.assert_allclose(np.diag(larger.P)[DP], 1.2**2 * np.diag(known.P)[DP])
+    np.testing.assert_array_equal(larger.P[2], known.P[2])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
-from truenorth.core.earth import radii
+from truenorth.core.earth import EARTH_RATE, radii
 from truenorth.errors.axes import standing
 from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 
@@ -79,6 +79,8 @@ class Moving:
     acting_bias : (3,) array or None, m/s^2
         What acts as the accelerometers' bias at that force, scale factors and misalignments included: `P` is of it, and navigation
         goes on with it. None: in a result of an earlier version, whose `accel_bias` it is.
+    in_body : bool
+        No sensor showed velocity or place over the ground: they are off as heading is.
     """
 
     v_n: Array
@@ -95,13 +97,17 @@ class Moving:
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=standing)
     acting_bias: Array | None = None
+    in_body: bool = False
 
     def less_sure(self, heading: float, level: float = 0.0, velocity: float = 1.0, position: float = 1.0) -> Moving:
-        """The same state with these variances (rad^2) added to heading and level, and sigmas so many times as large."""
-        factor = np.ones(len(self.P))
-        factor[DV], factor[DP] = velocity, position
-        P = factor[:, None] * self.P * factor
-        P[PHI, PHI] += np.diag([level, level, heading])
+        """The same state with these variances (rad^2) added to heading and level, and sigmas so many times as large.
+
+        What is added is an error of its own. Were velocity all so many times as far off, a log would see heading by the rest.
+        """
+        P = self.P + heading * np.outer(self.turn, self.turn)
+        P[PHI, PHI] += np.diag([level, level, 0.0])
+        for part, factor in ((DV, velocity), (DP, position)):
+            P[part, part] += np.diag((factor**2 - 1.0) * np.diag(P)[part])
         return replace(self, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
 
     def off_together(self, phi: Array) -> Moving:
@@ -114,25 +120,34 @@ class Moving:
         """The same state, heading less sure by this variance (rad^2), where no sensor shows velocity or place in n.
 
         A wheel shows neither which way it rolls nor which way it came. A heading error ``h`` turns velocity, and the way since
-        the beginning, about the vertical: by ``sin h`` of them sideways, by ``1 - cos h`` backwards. Of a Gaussian of variance s^2
+        the beginning, about the vertical: by ``sin h`` of them sideways, by ``1 - cos h`` backwards; and gyros are biased by what
+        that makes of the earth's rate (:mod:`truenorth.errors.azimuth_free`). Along the tangent all of it goes with ``h``, whole:
+        to navigation by the same sensors what is missing of velocity or bias would be heading seen. Backwards they go by no
+        heading, of a Gaussian of variance s^2
 
-            E sin^2 h = (1 - exp(-2 s^2)) / 2,    E (1 - cos h)^2 = 3/2 - 2 exp(-s^2 / 2) + exp(-2 s^2) / 2
+            E (1 - cos h)^2 = 3/2 - 2 exp(-s^2 / 2) + exp(-2 s^2) / 2
 
-        of which the filter has the first in its own, ``s^2`` for small ones.
+        and a log that shows the speed shows nothing of the way.
         """
-        own = float(self.P[PHI, PHI][2, 2])
-        whole = own + heading
-        sideways = max(0.5 * (1.0 - math.exp(-2.0 * whole)) - own, 0.0)
+        whole = float(self.P[PHI, PHI][2, 2]) + heading
         back = max(1.5 - 2.0 * math.exp(-0.5 * whole) + 0.5 * math.exp(-2.0 * whole), 0.0)
-        along = np.zeros(len(self.P))
-        along[DV][:2], along[DP][:2] = self.v_n[:2], self.gone
-        across = np.zeros(len(self.P))
-        for part in (DV, DP):
-            across[part][:2] = along[part][1], -along[part][0]
-        across *= math.sqrt(sideways)
-        across[PHI.stop - 1] = math.sqrt(heading)
-        P = self.P + np.outer(across, across) + back * np.outer(along, along)
-        return replace(self, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
+        turned = replace(self, in_body=True)
+        P = self.P + heading * np.outer(turned.turn, turned.turn)
+        for part, along in ((DV, self.v_n[:2]), (DP, self.gone)):
+            P[part, part][:2, :2] += back * np.outer(along, along)
+        return replace(turned, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
+
+    @property
+    def turn(self) -> Array:
+        """(15 + m,) all that a heading error of one radian goes with, to first order."""
+        turn = np.zeros(len(self.P))
+        turn[PHI.stop - 1] = 1.0
+        if self.in_body:
+            for part, along in ((DV, self.v_n[:2]), (DP, self.gone)):
+                turn[part][:2] = along[1], -along[0]
+            north = EARTH_RATE * math.cos(float(self.track.position[-1, 0]))
+            turn[BG] = self.track.C_nb[-1].T @ [-north, 0.0, 0.0]
+        return turn
 
     @property
     def gone(self) -> Array:
