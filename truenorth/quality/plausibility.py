@@ -161,9 +161,8 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
     if not np.isfinite(turning.best_agreement) or turning.best_agreement < AGREES:
         return False
     unexplained = max(0.05, limit("other reading") * (1.0 - turning.best_agreement))
-    if (
-        1.0 - max(turning.agreement, turning.arm_unscaled) > unexplained
-    ):  # below its axis an IMU feels the base lean the other way
+    # Below its axis an IMU feels the base lean the other way: the arm counts.
+    if 1.0 - max(turning.agreement, turning.arm_unscaled) > unexplained:
         findings.append(
             Finding(
                 "error",
@@ -174,9 +173,8 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
         )
         return True
     off = min(abs(scale - 1.0) for scale in (turning.scale, turning.arm_scale)) >= limit("scale by tilt")
-    far_better = 1.0 - turning.arm_unscaled > limit("other reading") * (
-        1.0 - turning.arm_agreement
-    )  # than gyros on an arm alone
+    # Better than an arm alone explains it.
+    far_better = 1.0 - turning.arm_unscaled > limit("other reading") * (1.0 - turning.arm_agreement)
     if turning.agreement < AGREES or not (off and far_better):
         return turning.agreement >= AGREES
     scale = turning.arm_scale
