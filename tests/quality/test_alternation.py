@@ -124,6 +124,15 @@ def test_a_counter_alternates_by_a_part_of_its_step():
     assert not alternation(ImuRecord(np.arange(1, n + 1) / RATE, gyro, counts, "increments", "counter")).any()
 
 
+@pytest.mark.parametrize("period", [2, 3, 5])
+def test_a_channel_that_stands_on_one_value_does_not_alternate(period):
+    """Coarse counts at rest: what rounding left of it was one sensor in three, of 8e-32 m/s^2."""
+    record = still(3)
+    accel = np.round(record.accel / 0.02) * 0.02
+    accel[:, 0] = 0.3 / 0.02 * 0.02
+    assert np.array_equal(alternation(replace(record, accel=accel), period), np.zeros(3))
+
+
 def test_the_judge_weighs_what_it_does_to_level():
     inputs, _ = BENCHES["still"].draw(3, 0)
     answers = [

@@ -39,6 +39,7 @@ SHORTEST = 32  # rows of one
 PARTS = 8  # of the log, that must all agree
 # Rows in which sensors take their turns; of four every second row differs, too, and of six.
 PERIODS = {2: "record.alternates", 3: "record.in_turn", 5: "record.in_turn"}
+ROUNDING = 1e-12  # of the largest value: differences of a channel that stands on one value are its rounding
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
@@ -202,8 +203,9 @@ def _turned(record: ImuRecord, period: int, stretches: int) -> float:
 
 
 def _step(values: Array) -> float:
-    """The smallest step between two values of a channel that is written in few levels; zero of one that has as many as rows."""
+    """The smallest step between two values of a channel that is written in few levels; of another one that of its rounding."""
+    rounding = ROUNDING * float(np.abs(values).max())
     if has_many_levels(values, 0.25):
-        return 0.0
+        return rounding
     levels = np.unique(values)
-    return float(np.diff(levels).min()) if 1 < len(levels) < len(values) // 4 else 0.0
+    return float(np.diff(levels).min()) if 1 < len(levels) < len(values) // 4 else rounding
