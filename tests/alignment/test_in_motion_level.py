@@ -56,7 +56,7 @@ def test_level_is_as_good_as_the_accelerometers(kind, runs):
 
 
 def test_a_vehicle_that_turns_keeps_what_turning_tells():
-    """Its heading is told, and its biases with it: level is far better than the biases allow."""
+    """Its heading is known, and its biases with it: level is far better than the biases allow."""
     motion, record, gnss = logs("turning", 1)
     answer = truenorth.align(record, None, "consumer", aid=[truenorth.Gnss(gnss)])
     sigma = np.sqrt(np.diag(answer.phi_covariance))

@@ -70,7 +70,7 @@ def test_as_forward(other, W):
 
 
 def test_sizes_written_in_the_kernel_change_no_bit(monkeypatch):
-    """A base at rest has a kernel of its own; told its sizes as it runs, the other one gives the same."""
+    """A base at rest has a kernel of its own; given its sizes as it runs, the other one gives the same."""
     rng, W = np.random.default_rng(5), AT_REST[2] - N
     gains = SimpleNamespace(
         step=0.3 * rng.standard_normal((K, N, N)),

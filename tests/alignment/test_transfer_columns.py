@@ -42,7 +42,7 @@ def test_calibrated_columns_claim_what_they_know():
     assert np.allclose(claimed, shared, atol=0.02)
     assert np.max(np.abs(seen.T @ seen / rows - seen.T @ true / rows)) > 0.3
     nothing = np.linalg.svd(true, full_matrices=False)[2][-1]  # no true column is along it
-    # A combination of states that shows nothing is not told by its noise.
+    # A combination of states that shows nothing is not shown by its noise.
     assert nothing @ claimed @ nothing < 0.01 < 0.1 < nothing @ (seen.T @ seen / rows) @ nothing
 
 

@@ -83,7 +83,7 @@ def swaying(imu, tones):
 
 @pytest.mark.slow
 def test_levels_of_shaken_flights():
-    """Before, of five such flights one was 2.6 sigmas off and one refused: the vibration told a false arm and delay."""
+    """Before, of five such flights one was 2.6 sigmas off and one refused: the vibration showed a false arm and delay."""
     shake = {name: [{"amplitude": f"{size} deg", "period": "0.1 s"}] for name, size in TONES.items()}
     bench, found = swaying("navigation", shake), []
     for run in range(5):

@@ -1,4 +1,4 @@
-"""Sums of neighbours, from which the kind of motion is told, against their definitions."""
+"""Sums of neighbours, from which the kind of motion is found, against their definitions."""
 
 import numpy as np
 import pytest

@@ -19,6 +19,7 @@ from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_axes import half_turn_evidence
 from truenorth.alignment.in_motion_clocks import clock_evidence, on_another_clock
+from truenorth.alignment.in_motion_hidden import HIDDEN, hidden_from, of_level
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
 from truenorth.alignment.in_motion_moments import two_moments, with_swing_apart
@@ -27,7 +28,6 @@ from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_m
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
-from truenorth.alignment.in_motion_untold import UNTOLD, hidden_from, of_level
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.led_at_rest import led_at_rest_evidence
 from truenorth.alignment.rest_rate import rest_evidence
@@ -220,7 +220,7 @@ def _aligned(
         last = open_track(task, first, track)
     if last is not None:
         spread = bank.beyond(SURELY * float(last.sigma[-1, PHI][2]))
-    elif method == "motion" and (hidden_from(task) or spread.and_more(found.sigma).heading > UNTOLD):
+    elif method == "motion" and (hidden_from(task) or spread.and_more(found.sigma).heading > HIDDEN):
         tell(f"pass {number + 1}")
         task, guess, track, spread = of_level(task, found, first, spread)
     answer = moving_answer(task, task.with_lasting_fixes(last or track), method, why, spread)

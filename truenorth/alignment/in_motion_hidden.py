@@ -35,7 +35,7 @@ from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-UNTOLD = math.radians(20.0)  # one sigma of heading: products of it with a tilt are no small part of the tilt
+HIDDEN = math.radians(20.0)  # one sigma of heading: products of it with a tilt are no small part of the tilt
 HELD = math.radians(0.1)  # one sigma of a heading that is held: it moves by less than errors of second order
 SETTLED = 0.1  # of its sigma, by which the level of the next pass may still differ
 MOST = 12  # passes
@@ -43,10 +43,10 @@ MOST = 12  # passes
 
 def hidden_from(task: MovingTask) -> bool:
     """Whether the log tells no heading: velocities in body axes alone, and gyros that hide the earth's rate."""
-    return task.gnss is None and not task.more and told_by_the_earth(task) > UNTOLD
+    return task.gnss is None and not task.more and shown_by_the_earth(task) > HIDDEN
 
 
-def told_by_the_earth(task: MovingTask) -> float:
+def shown_by_the_earth(task: MovingTask) -> float:
     """One sigma of heading, rad, by gyros whose constant biases are known: their noise and the slow parts of biases are left."""
     spec = task.spec
     slow = float(np.max(spec.bias_variance[:3] - spec.constant_variance[:3]))
@@ -73,7 +73,7 @@ def of_level(task: MovingTask, found: Pass, first: Guess, spread: Spread) -> tup
     """
     hidden = hidden_from(task)
     if hidden:  # a bank that is surer took the products of errors for knowledge
-        spread = spread.and_more(told_by_the_earth(task))
+        spread = spread.and_more(shown_by_the_earth(task))
     by_gravity = _by_gravity(task, found, first)
     if by_gravity is not None:
         return *by_gravity, spread
@@ -83,7 +83,7 @@ def of_level(task: MovingTask, found: Pass, first: Guess, spread: Spread) -> tup
     if held is None:
         return task, found.guess, with_level_biases(task, found.track), spread.and_more(found.sigma)
     last, all_round = held
-    return task, last.guess, last.track, all_round.and_more(told_by_the_earth(task))
+    return task, last.guess, last.track, all_round.and_more(shown_by_the_earth(task))
 
 
 def _with_heading_held(task: MovingTask, found: Pass, first: Guess) -> tuple[Pass, Spread] | None:

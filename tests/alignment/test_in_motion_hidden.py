@@ -1,4 +1,4 @@
-"""A cheap IMU with an odometer alone: no heading is told, and level is what turns between biases and tilts tell."""
+"""A cheap IMU with an odometer alone: no heading is known, and level is what turns between biases and tilts tell."""
 
 from dataclasses import replace
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import truenorth
+from truenorth.alignment.in_motion_hidden import HELD, about_zero, hidden_from
 from truenorth.alignment.in_motion_passes import turn_between
 from truenorth.alignment.in_motion_start import guesses_all_round
 from truenorth.alignment.in_motion_task import moving_task
-from truenorth.alignment.in_motion_untold import HELD, about_zero, hidden_from
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
