@@ -35,9 +35,9 @@ def test_gyros_that_see_no_turn_have_no_scale_factor():
     assert not [item for item in answer.evidence if item.key.startswith("rival.")]
 
 
-@pytest.mark.parametrize("runs", [1, pytest.param(6, marks=pytest.mark.slow)])
-def test_a_slave_ten_times_poorer_than_specified_is_not_wrong_in_silence(runs):
+@pytest.mark.slow
+def test_a_slave_ten_times_poorer_than_specified_is_not_wrong_in_silence():
     """The first log was 8.3 sigmas of heading off, `aligned`."""
-    trials = run_faults(["transfer"], [FAULT, "none"], runs=runs, seed=20611)
+    trials = run_faults(["transfer"], [FAULT, "none"], runs=6, seed=20611)
     assert not [trial for trial in trials if trial.outcome == "silent"]
     assert np.all([trial.outcome == "harmless" for trial in trials if trial.fault == "none"])

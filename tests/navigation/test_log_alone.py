@@ -1,6 +1,7 @@
 """A vehicle that sees its velocity in its own axes alone: heading is known as well as gyros and the earth allow, no better."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ def driven(motion, aid, duration, seed, perfect=False, **options):
     return result, result.track.errors_against(truth)
 
 
+@cache
 def ship(seed, perfect=False):
     motion, t = voyage(6.0, 1800.0)
     q = motion.states(t)
