@@ -24,6 +24,7 @@ from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import mounting_found
+from truenorth.estimate.memory import AS_IT_IS, OVER_GROUND
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.sensor_delay import on_springs
 from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_rest
@@ -200,7 +201,7 @@ class MovingTask:
             used,
             interval=INTERVAL,
             every=max(1, round(OUTPUT / INTERVAL)),
-            invariant=self.odometer is not None,
+            invariant=AS_IT_IS if self.odometer is None else OVER_GROUND,
         )
 
     @property

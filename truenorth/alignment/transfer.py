@@ -226,7 +226,7 @@ def _aligned(
     def of_another_imu(other: ImuSpec) -> Track:
         """The same measurements of a slave by another specification, with the master's errors estimated."""
         own = _model(other, said, what, flexure, errors, same_axes(other, said, model.groups))
-        own = own if errors == MasterErrors() else replace(own, considered=False)
+        own = replace(own, considered=False)
         _, begun = hand_over(slave, master, own, other, said, noise, position=position)
         return run(part, model=own, start=begun)
 

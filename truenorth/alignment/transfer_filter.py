@@ -34,6 +34,7 @@ from truenorth.errors.master import (
     VELOCITY_ERROR,
     TransferModel,
 )
+from truenorth.estimate.memory import AS_IT_IS, OVER_GROUND
 from truenorth.estimate.run import navigate_track
 from truenorth.quality.stamps import with_scatter
 from truenorth.records import ImuRecord, MasterRecord
@@ -142,6 +143,8 @@ def transfer_filter(
     if nominal is not None:
         off = nominal.off(start.C_nb, values, model.slice_of(MOUNTING))
         start, values = replace(start, C_nb=nominal.C_nb), nominal.values
+    # A poor IMU's attitude that translation alone shows is corrected by degrees, and velocity with it.
+    by_degrees = nominal is None and ACCEL_AXES in model.groups and not np.isfinite(matching.attitude_sigma)
     track = navigate_track(
         slave,
         start,
@@ -149,8 +152,7 @@ def transfer_filter(
         master_aiding(master, model, assumed, matching, linear, slave),
         interval=LONGEST_STEP,
         every=0,
-        # A poor IMU's attitude that translation alone shows is corrected by degrees, and velocity with it.
-        invariant=nominal is None and ACCEL_AXES in model.groups and not np.isfinite(matching.attitude_sigma),
+        invariant=OVER_GROUND if by_degrees else AS_IT_IS,
         prior=(P, values),
         open_until=None if nominal is None else nominal.until,
         off=off,

@@ -262,7 +262,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         model.sensor_states,
         model.fixed_altitude,
         *model.turn_noise,
-        int(setting.invariant),
+        setting.invariant,
         model.drift_state,
         setting.covariance,
         any(group.considered for group in model.groups),

@@ -9,6 +9,7 @@ from truenorth.aiding.sensors import from_odometer
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.errors.in_motion_azimuth import STATES, correction
 from truenorth.errors.model import InsModel
+from truenorth.estimate.memory import AS_IT_IS, OVER_GROUND
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, POSITION_SIGMA, VELOCITY_SIGMA, Errors
 from truenorth.papers.odometer.scenario import Drives
@@ -60,7 +61,7 @@ def run_invariant(
             aiding,
             interval=INTERVAL,
             every=round(1.0 / INTERVAL),
-            invariant=invariant,
+            invariant=OVER_GROUND if invariant else AS_IT_IS,
         )
         errors = track.errors_against(drives.truth)[1:]
         kept["phi"].append(errors[:, PHI])
