@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.alignment.test_transfer import ARCMIN, DEG, DEG_PER_HOUR, SPAN, TACTICAL
 from tests.alignment.test_transfer_axes import ARM, ship
+from tests.alignment.test_transfer_loop import ARCMIN, DEG, DEG_PER_HOUR, SPAN, TACTICAL
 from tests.runs import few_and_all, some
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_filter import Assumed, Matching, _slopes, master_aiding, transfer_filter

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.honesty.transfer import ERRORS, aircraft, ship
-from tests.alignment.test_transfer import ARCMIN, DEG, MASTER, TACTICAL
+from tests.alignment.test_transfer_loop import ARCMIN, DEG, MASTER, TACTICAL
 from truenorth.aiding.aids import Master
 from truenorth.alignment import align
 from truenorth.alignment.transfer import align_transfer
