@@ -180,6 +180,18 @@ def test_smoothing_is_at_least_as_good(drive):
     assert errors[1] < errors[0]
 
 
+@pytest.mark.slow
+def test_only_rivals_that_may_count_are_smoothed(drive, monkeypatch):
+    """Most rivals are ruled out by their innovations, which are the filter's: to smooth them takes ten times as long."""
+    from truenorth.estimate import smoothing
+
+    smooth, made = smoothing.smoothed, []
+    monkeypatch.setattr(smoothing, "smoothed", lambda *given: made.append(1) or smooth(*given))
+    motion, record, start = drive
+    result = navigate(record, start, aid=Gnss(fixes(motion, np.arange(1.0, 179.0, 1.0))), imu=SPEC, smooth=True)
+    assert result.status == "navigated" and 1 <= len(made) <= 6
+
+
 def test_navigation_starts_from_an_alignment_and_from_its_folder(tmp_path):
     """The folder holds what the object does; tilt and accelerometer bias stay balanced, so that little is lost at rest."""
     spec = imu_spec("navigation")

@@ -118,9 +118,11 @@ def poorer_rivals(first: Track, others: Sequence[Other]) -> list[Rival]:
     for key in dict.fromkeys(other.key for other in others):
         own = [k for k, other in enumerate(others) if other.key == key]
         best = max((others[k] for k in own), key=lambda other: other.ratio)
+        if best.ratio <= 0.0:
+            continue
         effect, chance = effect_of(first, best.track), float(chances[own].sum())
         little = weight(effect.times(math.sqrt(chance)), sigma) <= limit("negligible")
-        if best.ratio > limit("rival") or (best.ratio > 0.0 and not little):
+        if best.ratio > limit("rival") or not little:
             found.append(Rival(best.ratio, key, {"factor": best.factor}, effect, chance))
     return found
 
@@ -130,9 +132,10 @@ def growth_along(first: Track, others: Sequence[Other]) -> Array:
     variance = first.sigma[:, :9] ** 2
     more = np.zeros_like(variance)
     for other, chance in zip(others, _chances(others), strict=True):
-        near = nearest(other.track.time, first.time)
-        d = first.errors_against(other.track, near)
-        more += chance * (other.track.sigma[near, :9] ** 2 - variance + d**2)
+        track = other.track.whole()
+        near = nearest(track.time, first.time)
+        d = first.errors_against(track, near)
+        more += chance * (track.sigma[near, :9] ** 2 - variance + d**2)
     return np.sqrt(1.0 + np.maximum(more, 0.0) / np.where(variance > 0.0, variance, np.inf))
 
 

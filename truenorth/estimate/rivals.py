@@ -308,6 +308,7 @@ def moved(first: Track, other: Track) -> Effect:
     What changes late is in the last; a last one may be small by chance. Epochs that a delay has moved are compared with the
     other's nearest.
     """
+    first, other = first.whole(), other.whole()
     half = slice(len(first.C_nb) // 2, None)
     near = nearest(other.time, first.time[half])
     off = np.abs(first[half].errors_against(other, near))
@@ -320,6 +321,7 @@ def moved(first: Track, other: Track) -> Effect:
 
 def effect_along(first: Track, other: Track) -> Effect:
     """By how much two tracks differ at most, anywhere on the way: in sigmas of the first there, as sizes at its end."""
+    first, other = first.whole(), other.whole()
     off = np.abs(first.errors_against(other, nearest(other.time, first.time)))
     sigma = first.sigma[:, :9]
     known = sigma > 0.0

@@ -71,7 +71,7 @@ class Others:
     def moved(self, track: Track, others: Sequence[Track]) -> Array:
         """(K, 9) by how much the answers from these starts, together, differ from the track: phi, dv, dp."""
         squares = np.zeros((len(track), 9))
-        for other, part in zip(others, self.parts, strict=True):
+        for other, part in zip((run.whole() for run in others), self.parts, strict=True):
             squares += (track.errors_against(other, nearest(other.time, track.time)) / part) ** 2
         return np.sqrt(squares)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -77,10 +78,11 @@ class Plan:
         said = [source for a in given.values() for source in a.sources(self.altitude)]
         return with_scatter(louder(with_slow(said, self.slow), self.factors), self.scattered)
 
-    def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
-        """Filter (and smooth) with these measurements."""
+    def run(self, sensors: Sequence[Aiding], smooth: bool = False) -> Track:
+        """Filter with these measurements; smooth once that is asked for (:meth:`Track.whole`): it takes ten times as long."""
         used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late), *self.always]
-        return navigate_track(
+        navigated = partial(
+            navigate_track,
             self.record,
             self.start,
             with_states(self.model, used),
@@ -88,8 +90,8 @@ class Plan:
             interval=self.interval,
             every=self.every,
             invariant=fed_back(used),
-            **options,
         )
+        return replace(navigated(), smoothing=cache(partial(navigated, smooth=True)) if smooth else None)
 
     def finest(self) -> Track:
         """Free, at every interval, without covariance."""
@@ -132,11 +134,12 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
         said += shown
         track = plan.run(plan.sources(given), smooth=smooth)
     receiver = given.get(Gnss.key)
+    if isinstance(receiver, Gnss) and plan.slow.keys() & {FIXES, SPEEDS}:
+        plan, more = _fitted(plan, given, receiver)
+        said += more
+        track = plan.run(plan.sources(given), smooth=smooth)
+    track = track.whole()
     if isinstance(receiver, Gnss):
-        if plan.slow.keys() & {FIXES, SPEEDS}:
-            plan, more = _fitted(plan, given, receiver)
-            said += more
-            track = plan.run(plan.sources(given), smooth=smooth)
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
         track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES), fixes)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -86,6 +86,9 @@ class Track:
     P: Array  # (K, n, n): covariance of the errors; K = 0 where none was asked for
     layout: Layout  # of the states
     residuals: tuple[Residuals, ...]
+    smoothing: Callable[[], Track] | None = field(
+        default=None, repr=False, compare=False
+    )  # put off until it is asked for
 
     @classmethod
     def of_motion(cls, time: Array, C_nb: Array, v_n: Array, position: Array, biases: Array | None = None) -> Track:
@@ -102,7 +105,14 @@ class Track:
     def __getitem__(self, rows: Rows) -> Track:
         """Some of the epochs; the residuals, which have rows of their own, stay with the whole track."""
         some = {name: values[rows] if len(values) else values for name in ARRAYS for values in [getattr(self, name)]}
-        return replace(self, residuals=(), **some)
+        return replace(self, residuals=(), smoothing=None, **some)
+
+    def whole(self) -> Track:
+        """The track smoothed, where that was put off; else itself.
+
+        Innovations are the filter's either way, and so is the last epoch: most tracks that are tried are ruled out by these.
+        """
+        return self if self.smoothing is None else self.smoothing()
 
     @cached_property
     def interval(self) -> float:
