@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from os import PathLike
 from typing import Any
@@ -159,6 +160,7 @@ def in_motion(r: Request) -> Alignment:
     """A vehicle under way, by odometer or velocity log, GNSS or both."""
     from truenorth.alignment.in_motion import align_in_motion
     from truenorth.errors.log import LogErrors, log_errors
+    from truenorth.quality.clock_apart import on_its_clock
 
     odometer, log, gnss = r.aids.get(Odometer), r.aids.get(VelocityLog), r.aids.get(Gnss)
     wheel = odometer or log
@@ -167,11 +169,11 @@ def in_motion(r: Request) -> Alignment:
             "on the move the errors of the IMU cannot be found from the log; expected imu: navigation, tactical, industrial, "
             "consumer, a YAML file or an ImuSpec"
         )
-    found = align_in_motion(
+    aligned = partial(
+        align_in_motion,
         r.record,
         r.imu,
         odometer=None if odometer is None else odometer.record,
-        gnss=None if gnss is None else gnss.record,
         velocity=None if log is None else log.record,
         velocity_errors=LogErrors() if log is None else log_errors(log.errors, "body"),
         position=r.place,
@@ -182,6 +184,7 @@ def in_motion(r: Request) -> Alignment:
         calibration=r.calibration,
         **r.common,
     )
+    found = on_its_clock(lambda rows: aligned(gnss=rows), r.record, None if gnss is None else gnss.record)
     return found if log is None else replace(found, evidence=(*found.evidence, *log.unsaid))
 
 
@@ -362,11 +365,9 @@ def align(
         answer = recipe(request)
         return replace(answer, evidence=(*answer.evidence, *unsaid)) if unsaid else answer
     except TypeError as error:
-        refused = (
-            "unexpected keyword argument",
-            "multiple values for argument",
-            "multiple values for keyword argument",
-        )
+        refused = [
+            f"{what} argument" for what in ("unexpected keyword", "multiple values for", "multiple values for keyword")
+        ]
         wrong = next((name for name in options if any(f"{said} '{name}'" in str(error) for said in refused)), None)
         if wrong is None:
             raise

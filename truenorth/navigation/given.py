@@ -16,7 +16,7 @@ from truenorth.core.errors import UsageError
 from truenorth.estimate.memory import IN_BODY, OVER_GROUND
 from truenorth.navigation.curve import seen_in_body
 from truenorth.navigation.result import Altitude
-from truenorth.records import Late
+from truenorth.records import GnssRecord, Late
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import ANTENNA_ARM
@@ -41,6 +41,13 @@ def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
         raise UsageError(f"aid holds two of one kind: {', '.join(a.key for a in aids)}; expected one of each")
     order = [kind.key for kind in AIDS]
     return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
+
+
+def with_rows(given: Mapping[str, Any], rows: GnssRecord | None) -> list[Any]:
+    """The aids with these rows of the receiver. On another clock they are not as late as an alignment has found."""
+    if rows is None or rows is (receiver := given[Gnss.key]).record:
+        return list(given.values())
+    return [*({**given, Gnss.key: Gnss(rows, receiver.mounting or receiver.usual)}).values()]
 
 
 def late_as_found(antenna: Mounting, begin: Start) -> Mounting:

@@ -43,6 +43,7 @@ from truenorth.navigation.given import (
     record_of,
     said_of,
     taken_over,
+    with_rows,
 )
 from truenorth.navigation.gyro_moment import gyros_of_another_moment
 from truenorth.navigation.passes import COARSE, Plan, filtered, quick_swing
@@ -53,6 +54,7 @@ from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_overlap, check_places
+from truenorth.quality.clock_apart import on_its_clock
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.held import as_sampled
@@ -152,7 +154,6 @@ def navigate(
         _by_specification,
         record,
         start,
-        aid=aid,
         altitude=altitude,
         zupt=zupt,
         smooth=smooth,
@@ -166,12 +167,18 @@ def navigate(
         damping=damping,
         progress=progress,
     )
-    answer = by(imu=imu)
-    if damping is not None or answer.status != "inconsistent":
-        return answer
-    log, spec = as_sampled(record), start_of(start, imu)[1]
-    spec = seen_in(with_rounding(spec, log, aided=bool(by_key(aid))), log)
-    return as_noisy_as_its_rows(answer, log, spec, lambda x: by(imu=x))
+
+    def navigated(rows: GnssRecord | None) -> Navigation:
+        aids = with_rows(given, rows)
+        answer = by(imu=imu, aid=aids)
+        if damping is not None or answer.status != "inconsistent":
+            return answer
+        log, spec = as_sampled(record), start_of(start, imu)[1]
+        spec = seen_in(with_rounding(spec, log, aided=bool(aids)), log)
+        return as_noisy_as_its_rows(answer, log, spec, lambda x: by(imu=x, aid=aids))
+
+    given = by_key(aid)
+    return on_its_clock(navigated, record, record_of(given, Gnss))
 
 
 def _by_specification(

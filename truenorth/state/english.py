@@ -160,6 +160,15 @@ SENTENCES = {
         "the IMU's clock runs slow against that of the {name} by {size:.0f} ± {sigma:.2g} ppm: delays change so, "
         "which is estimated and in sigma"
     ),
+    "clock.ahead": (
+        "{name}: its clock is {size:.0f} s ahead of the IMU's, as the turns that both see show: its rows are taken as {size:.0f} s "
+        "earlier"
+    ),
+    "clock.behind": (
+        "{name}: its clock is {size:.0f} s behind the IMU's, as the turns that both see show: its rows are taken as {size:.0f} s "
+        "later"
+    ),
+    "clock.gps_or_utc": "GPS time is 18 s ahead of UTC: one of the two logs may be in GPS time, the other in UTC",
     "clock.may_run": (
         "the clocks of the IMU and the {name} may run apart by {size:.0f} ppm: the log neither shows nor rules this out "
         "(likelihood ratio {ratio:.3g}), and what it would do is in sigma by its chance: log more turns, or a longer log"
