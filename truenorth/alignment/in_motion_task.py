@@ -45,6 +45,7 @@ from truenorth.quality.slow_aids import (
 )
 from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
 from truenorth.quality.swing import VELOCITIES, shown_arm, swing, unseen_swing, with_unseen_arm
+from truenorth.quality.wheel_unit import check_unit
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specified import corrected, seen_in
@@ -256,6 +257,9 @@ def moving_task(
         position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
         check_fixes(gnss, position, float(record.time[0]))
+    wheel = WHEEL if wheel is None else wheel
+    if isinstance(odometer, OdometerRecord):
+        check_unit(record, odometer, gnss, wheel)
     spec = seen_in(spec, record).with_coning_of(record)
     stops: list[Aiding] = list(gaps)
     if zupt:
@@ -268,7 +272,7 @@ def moving_task(
         position,
         odometer,
         gnss,
-        WHEEL if wheel is None else wheel,
+        wheel,
         usual_antenna(gnss) if antenna is None else antenna,
         stops,
         more,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import Aid, Gnss, VelocityLog
+from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.core.errors import DataError, UsageError
@@ -62,6 +62,7 @@ from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
+from truenorth.quality.wheel_unit import check_unit
 from truenorth.records import GnssRecord, ImuRecord
 from truenorth.records.specified import corrected, seen_in
 from truenorth.records.specs import ImuSpec
@@ -224,6 +225,8 @@ def _by_specification(
         tell("looking for stops")
         plan = replace(plan, always=[*zero_updates(record, zupt, *logs_of_speed(given)), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
+    if isinstance(wheel := given.get(Odometer.key), Odometer):
+        check_unit(plan.record, wheel.record, record_of(given, Gnss), wheel.mounting or wheel.usual)
     tell("navigating")
     done, loose = (
         filtered_by_possible_arm(plan, given, smooth) if check_clocks else (filtered(plan, given, smooth), None)
