@@ -15,7 +15,7 @@ from truenorth.errors.group import Group
 from truenorth.errors.master import TransferModel
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import Setting
-from truenorth.estimate.memory import OVER_GROUND
+from truenorth.estimate.memory import EITHER, OVER_GROUND
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
 from truenorth.simulation.course import course
@@ -92,16 +92,15 @@ def test_chunks_give_the_bits_of_one_batch(drive, retimed):
 
 
 @pytest.mark.slow
-def test_chunks_of_invariant_errors_give_the_bits_of_one_batch(drive):
+@pytest.mark.parametrize("fed_back", [OVER_GROUND, EITHER])
+def test_chunks_of_invariant_errors_give_the_bits_of_one_batch(drive, fed_back):
     """As alignment on the move with an odometer runs the loop: from a heading 60 deg off."""
     record, start, fixes, _ = drive
     turn = dcm_from_rotation_vector([0.0, 0.0, np.radians(60.0)])
     P = start.P.copy()
     P[2, 2] = 1.0
     start = replace(start, C_nb=turn @ start.C_nb, v_n=turn @ start.v_n, P=P)
-    setting = Setting(
-        with_states(InsModel.from_spec(SPEC), [fixes]), (fixes,), stride=10, every=3, invariant=OVER_GROUND
-    )
+    setting = Setting(with_states(InsModel.from_spec(SPEC), [fixes]), (fixes,), stride=10, every=3, invariant=fed_back)
     _, batch = go_on(setting, begin(setting, start, 0.0, record.interval), record, last=True)
     for size in (1000, 7, 1):
         assert_same(in_chunks(setting, start, record, size, (fixes,)), batch, size)

@@ -129,8 +129,10 @@ def test_what_shows_velocity_or_place_over_the_ground():
 def test_what_a_heading_four_sigmas_off_makes_of_velocity_and_place_is_within_four_sigmas(sigma):
     result, _ = ship(1)
     track = result.track[:200]
-    P = np.zeros_like(track.P)
-    P[:, 2, 2] = sigma**2
+    way = 6.0 * (track.time - track.time[0])
+    off = np.zeros((len(track), track.P.shape[1]))  # of an azimuth of one sigma
+    off[:, 2], off[:, 3], off[:, 6] = sigma, 6.0 * sigma, way * sigma
+    P = off[:, :, None] * off[:, None, :]
     v = np.tile([0.0, 6.0, 0.0], (len(track), 1))
     straight_on = type(track)(track.time, track.C_nb, v, track.position, track.sensors, P, track.layout, ())
     in_body = Aiding("velocity log", "body velocity", np.ones(1), np.ones((1, 3)), np.ones((1, 3)))

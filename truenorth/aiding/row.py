@@ -73,6 +73,11 @@ class Row:
     unit: str = "m/s"
     axes: tuple[str, ...] = LEVEL_FRAME
 
+    @property
+    def over_ground(self) -> bool:
+        """Whether `z` is a velocity or a place along east and north."""
+        return self.axes == LEVEL_FRAME and self.unit in ("m", "m/s")
+
 
 row = compiled_callback(SIGNATURE)  # compiles a row of a measurement, with the signature that the loop calls
 row_at = Pointer(SIGNATURE)

@@ -14,7 +14,7 @@ from truenorth.aiding.body_velocity import BODY_VELOCITY
 from truenorth.aiding.height import HEIGHT
 from truenorth.aiding.position import POSITION
 from truenorth.aiding.rest import ROTATION
-from truenorth.aiding.row import LEVEL_FRAME, Row
+from truenorth.aiding.row import Row
 from truenorth.aiding.velocity import VELOCITY
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError, UsageError
@@ -150,7 +150,7 @@ class Aiding:
     @property
     def over_ground(self) -> bool:
         """Whether it shows velocity or place along east and north, which turn with the azimuth; that nothing moves does not."""
-        along = self.row.axes == LEVEL_FRAME and self.row.unit in ("m", "m/s") and self.does == "measurement"
+        along = self.row.over_ground and self.does == "measurement"
         return along and not (len(self.time) > 0 and not np.nan_to_num(self.measured).any())
 
     def gates(self) -> Array:

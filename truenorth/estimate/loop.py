@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
-from truenorth.errors import azimuth_free, invariant
+from truenorth.estimate import along_curve
 from truenorth.estimate.apart import innovations_there, is_exact
 from truenorth.estimate.correct import (
     damp_height,
@@ -35,7 +35,6 @@ from truenorth.estimate.memory import (
     ABSENT,
     DISTURB,
     IN_BODY,
-    OVER_GROUND,
     PLACE,
     REJECTED,
     REOPENED,
@@ -64,7 +63,8 @@ class Room(NamedTuple):
     """What an event is worked out in.
 
     `F` (N, N), `rate` (n,), `S` (3, 4), `R` (3,), `now`; `Phi`, `Q` since it, or (0, 0); places of `columns` (N,); `s`, `aux`, `x`
-    of an output; of a motion whose errors are kept apart `there`, as `now`, and `z` (3,), once they are taken off.
+    of an output; of a motion whose errors are kept apart `there`, as `now`, and `z` (3,), once they are taken off;
+    `bent` for rows along a curve.
     """
 
     F: Array
@@ -80,6 +80,7 @@ class Room(NamedTuple):
     x: Array
     there: Array
     z: Array
+    bent: along_curve.Bent
 
 
 @borrowing(forceinline=True)
@@ -119,8 +120,12 @@ def correct(
         elif model.opened:
             for b in range(len(m.x)):
                 w.z[a] -= w.H[a, b] * m.x[b]
-        kept.innovation[number, a] = w.z[a]
     kept.when[number] = time
+    in_body, lever = along_curve.knows_body(model, m.s, m.aux, w.P), along_curve.lever_now(model, m.s, m.lever, w.P)
+    if in_body and sources.over_ground[source]:
+        along_curve.follow(size, m, model.drift, lever, w, room.bent)
+    for a in range(3):
+        kept.innovation[number, a] = w.z[a]
     columns = room.columns[: touched(w.H, room.columns)]
     count, nis = joint_nis(size, w, columns, room.S, kept.sigma[number])
     if count == 0:
@@ -167,14 +172,11 @@ def correct(
             feed_back(m.s, m.aux, m.x, model.dynamics.turns)
             set_matrix(m.s, m.sums.C_now)
         return SOUND
-    if model.invariant == IN_BODY:
-        if smoothing:
-            azimuth_free.keep_reset(m.s, w.x, m.aux, model.drift, kept.D[link])
-        azimuth_free.reset(m.s, w.x, m.aux, model.drift, w.P)
-    elif model.invariant == OVER_GROUND:
-        if smoothing:
-            invariant.keep_reset(m.s, w.x, model.fixed_altitude, kept.D[link])
-        invariant.reset(m.s, w.x, w.P, model.fixed_altitude)
+    if smoothing:
+        along_curve.keep_reset(m, model, in_body, lever, w.x, kept.D[link])
+    along_curve.reset(m, model, in_body, lever, w)
+    if model.invariant >= IN_BODY:
+        along_curve.move_lever(m.lever, w.x, sources.over_ground[source], w.P)
     feed_back(m.s, m.aux, w.x, model.dynamics.turns)
     set_matrix(m.s, m.sums.C_now)
     return SOUND
@@ -190,6 +192,7 @@ def keep(m: Memory, model: Model, w: Any, room: Room, time: float, j: int, kept:
     if model.opened:
         feed_back(room.s, room.aux, room.x, model.dynamics.turns)
     kept.time[j] = time
+    kept.lever[j, 0], kept.lever[j, 1] = m.lever[0], m.lever[1]
     for a in range(12):
         kept.state[j, a] = room.s[a]
     for a in range(9, len(m.aux)):
@@ -298,6 +301,8 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
             continue
         if model.covariance and m.sums.T[0] > 0.0:
             predict_to_event(size, m, model, F, rate, now, w, Q, Phi)
+            if model.invariant >= IN_BODY:
+                along_curve.lengthen_lever(m, F, w.P, Q)
             if len(model.dynamics.acts) > 0:
                 feed_back(m.s, m.aux, w.x, model.dynamics.turns)
                 set_matrix(m.s, m.sums.C_now)
@@ -381,6 +386,7 @@ def run(size: Any, task: Task, m: Memory, kept: Kept) -> Any:
         np.zeros(n),
         np.zeros(NOW_LENGTH),
         np.zeros(3),
+        along_curve.bent(N),
     )
     for a in range(links):
         room.Phi[a, a] = 1.0

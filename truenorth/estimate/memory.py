@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.azimuth_free import lever_of
 from truenorth.errors.dynamics import Dynamics
 from truenorth.strapdown import wander
 
@@ -15,9 +16,10 @@ Integers = NDArray[np.int64]
 
 MEASURE, DISTURB, PLACE = range(3)  # what an event of a source does
 ABSENT, USED, REJECTED, REOPENED = range(4)  # verdicts
-# How a correction is fed back: as it is; with velocity turned (:mod:`truenorth.errors.invariant`); and, where nothing shows
-# velocity or place over the ground, with the gyros' biases turned too (:mod:`truenorth.errors.azimuth_free`).
-AS_IT_IS, OVER_GROUND, IN_BODY = range(3)
+# How a correction is fed back: as it is; with velocity turned (:mod:`truenorth.errors.invariant`); where nothing shows velocity
+# or place over the ground, with the way and the gyros' biases turned too (:mod:`truenorth.errors.azimuth_free`); and as either of
+# the last two, by which velocity the covariance knows better, that over the ground or that in the body.
+AS_IT_IS, OVER_GROUND, IN_BODY, EITHER = range(4)
 BACK, AHEAD = 2, 3  # samples before and after an epoch that its rate is taken from
 
 
@@ -45,7 +47,7 @@ class Sources(NamedTuple):
 
     `loop`: time constant of a vertical loop (s); `instant`: it needs the rate at its own time, `swings`: on an arm; `patience`:
     rows rejected in a row until a jump is believed, and `opens`, the first of three states that take it up; `nudge`: how much later
-    than its time a row may be taken (s).
+    than its time a row may be taken (s); `over_ground`: it shows velocity or place along east and north.
     """
 
     action: Integers
@@ -58,6 +60,7 @@ class Sources(NamedTuple):
     swings: NDArray[np.bool_]
     patience: Integers
     opens: Integers
+    over_ground: NDArray[np.bool_]
 
 
 class Model(NamedTuple):
@@ -99,7 +102,7 @@ class Kept(NamedTuple):
 
     `time`, `state`, `aux`, `P` are those at each output; `when`, `innovation`, `sigma`, `nis`, `verdict` those of each
     event, the re-timed ones behind the others; `Phi, Q, H, dx` lead from event to event, for the smoother, and `D` from the errors
-    before a correction to those left after it.
+    before a correction to those left after it; `lever` (J, 2) is that at each output.
     """
 
     time: Array
@@ -116,6 +119,7 @@ class Kept(NamedTuple):
     H: Array
     dx: Array
     D: Array
+    lever: Array
 
 
 class Sums(NamedTuple):
@@ -133,7 +137,8 @@ class Memory(NamedTuple):
     `s` (24,) the state of :mod:`truenorth.strapdown.wander`; `aux` (n,) what is assumed in the places of the states;
     `P` (n, n) along w; `x` (n,) errors that are known and not fed back, along w: zeros in a closed loop; `largest` (n,) variances
     so far; `sums` since the last event, `means` up to it; `done` (1,) part of the next sample that is taken; `heard` (1,) when the
-    vertical loop was fed; `refused` (S,) rows rejected in a row.
+    vertical loop was fed; `lever` (3,) m, the way from the place about which the vehicle turns with its azimuth, along w, and what
+    that leaves out; `refused` (S,) rows rejected in a row.
     """
 
     s: Array
@@ -145,13 +150,15 @@ class Memory(NamedTuple):
     means: Sums
     done: Array
     heard: Array
+    lever: Array
     refused: Integers
 
     def copy(self) -> Memory:
         """Arrays of its own."""
         sums, means = (Sums(*(a.copy() for a in part)) for part in (self.sums, self.means))
         s, aux, P, x, largest = (a.copy() for a in self[:5])
-        return Memory(s, aux, P, x, largest, sums, means, self.done.copy(), self.heard.copy(), self.refused.copy())
+        done, heard, lever = (a.copy() for a in self[7:10])
+        return Memory(s, aux, P, x, largest, sums, means, done, heard, lever, self.refused.copy())
 
 
 def memory(s: Array, aux: Array, P: Array, begin: float, sources: int, x: Array | None = None) -> Memory:
@@ -169,5 +176,6 @@ def memory(s: Array, aux: Array, P: Array, begin: float, sources: int, x: Array 
         means,
         np.zeros(1),
         np.array([begin]),
+        np.append(lever_of(P), 0.0),
         np.zeros(sources, dtype=np.int64),
     )

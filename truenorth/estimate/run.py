@@ -277,8 +277,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
     if code != SOUND:
         _raise(code, kept.when[event], sources[int(np.append(plan.source, late.source)[event])])
     residuals = _residuals(sources, plan, late.at(np.arange(row_)), kept, after.outside)
-    left = late.at(np.arange(row_, len(late.time)))
-    first = max(0, taken - BACK)
+    left, first = late.at(np.arange(row_, len(late.time))), max(0, taken - BACK)
     tail = Samples(*(a[first:] for a in state.samples))
     after = replace(
         after,
@@ -330,6 +329,7 @@ def _room(setting: Setting, plan: Rows, late: Rows, n: int) -> Kept:
         H=np.zeros((links, 3, n)),
         dx=np.zeros((links, n)),
         D=np.tile(np.eye(n), (links, 1, 1)),
+        lever=np.zeros((outputs, 2)),
     )
 
 
@@ -360,6 +360,7 @@ def kernel_sources(aiding: Sequence[Aiding], model: InsModel) -> Sources:
         np.array([source.instant and source.row.swings for source in aiding], dtype=np.bool_),
         np.array([source.patience if source.opens is not None else NEVER for source in aiding], dtype=np.int64),
         opens,
+        np.array([source.row.over_ground for source in aiding], dtype=np.bool_),
     )
 
 

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import azimuth_free, invariant
+from truenorth.estimate.along_curve import knows_body, lever_now
 from truenorth.estimate.correct import feed_back
-from truenorth.estimate.memory import IN_BODY, OVER_GROUND, USED, Events, Kept, Model
+from truenorth.estimate.memory import AS_IT_IS, USED, Events, Kept, Model
 from truenorth.filters import LinearSystem
 from truenorth.filters.smoother import smoother
 from truenorth.strapdown import wander
@@ -66,9 +67,10 @@ def smoothed(plan: Events, kept: Kept, P0: Array, model: Model) -> tuple[Array, 
     full = np.zeros((len(state), wander.LENGTH))
     full[:, : state.shape[1]] = state
     for k in range(len(state)):
-        if model.invariant == IN_BODY:
-            azimuth_free.reset(full[k], left[k], sensors[k], model.drift, P[k])
-        elif model.invariant == OVER_GROUND:
+        if knows_body(model, full[k], sensors[k], kept.P[k]):
+            lever = lever_now(model, full[k], kept.lever[k], kept.P[k])
+            azimuth_free.reset(full[k], left[k], sensors[k], model.drift, lever, P[k])
+        elif model.invariant != AS_IT_IS:
             invariant.reset(full[k], left[k], P[k], model.fixed_altitude)
         feed_back(full[k], sensors[k], left[k], model.dynamics.turns)
     return full[:, : state.shape[1]], sensors, P

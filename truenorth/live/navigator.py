@@ -37,7 +37,7 @@ from truenorth.live.past import Past
 from truenorth.live.siblings import Siblings
 from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.by_start import unsure_heading
-from truenorth.navigation.curve import Sums, sums_after, with_curve
+from truenorth.navigation.curve import with_curve
 from truenorth.navigation.given import arm_as_begun, fed_back, kept_altitude, mountings_found
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
@@ -58,7 +58,7 @@ Array = NDArray[np.float64]
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
     "start", "spec", "_given", "_imu", "_imu_source", "feeds", "_mountings", "altitude", "intake", "log", "output", "failure",
-    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps", "_noise", "_siblings", "_off",
+    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps", "_noise", "_siblings",
 )  # fmt: skip
 FIRST = 20  # rows that show the interval of sampling
 STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
@@ -126,7 +126,6 @@ class Navigator:
         self._gaps: list[tuple[float, float]] = []
         self._noise = NoiseSeen(self.spec, kind)
         self._siblings = Siblings(self.start)
-        self._off: Sums | None = None  # what the curve of the velocity has made of the place so far
         self._lock = threading.Lock()
 
     def __repr__(self) -> str:
@@ -324,7 +323,6 @@ class Navigator:
             return
         self._loop_end = float(part[-1, 0])
         self.past.add(track)
-        self._off = sums_after(track, self._off)
         self._siblings.take(self._setting, samples, aiding, track)
 
     def _samples(self, rows: Array) -> ImuRows:
@@ -362,9 +360,7 @@ class Navigator:
         Heading is known no better than siblings leave it; `most`: how far they were before this track.
         """
         if self._setting is not None:
-            # Of one epoch, what came before it counts; of all of them they count themselves.
-            since = self._off if len(track) == 1 else None
-            track = with_curve(track, self._setting.sources, since=since)
+            track = with_curve(track, self._setting.sources)
         track = replace(track, residuals=self.past.residuals)
         receiver = (
             None if Gnss.key not in self.feeds else self.feeds[Gnss.key].newest(NEWEST, self._mountings.get(Gnss.key))

@@ -31,7 +31,7 @@ from truenorth.estimate.spiked import spike_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.arm import filtered_by_possible_arm, looser_track
 from truenorth.navigation.by_start import start_evidence
-from truenorth.navigation.curve import seen_in_body, with_curve
+from truenorth.navigation.curve import with_curve
 from truenorth.navigation.given import (
     arm_as_begun,
     by_key,
@@ -244,7 +244,7 @@ def _by_specification(
     result = Navigation(
         status="navigated",
         evidence=(),
-        track=_counted_whole(_curved(plan, used, track, smooth), given),
+        track=_counted_whole(with_curve(track, plan.sources(used)), given),
         altitude=height,
         smoothed=smooth,
         gaps=gaps,
@@ -275,14 +275,6 @@ def _damped(
     fine = plan.finest() if reference is not None and plan.every > 1 else None
     known = [group for group in plan.model.groups if group.name not in (SLOW_GYRO, SLOW_ACCEL)]
     return damp_navigation(result, reference, noise, damping, known, fixes, fine)
-
-
-def _curved(plan: Plan, given: Mapping[str, Any], track: Track, smooth: bool) -> Track:
-    """The track with what the curve of its velocity adds."""
-    aiding = plan.sources(given)
-    if not smooth or not seen_in_body(aiding):
-        return with_curve(track, aiding)
-    return with_curve(track, aiding, plan.run(aiding))
 
 
 def _counted_whole(track: Track, asked: Mapping[str, Any]) -> Track:
