@@ -8,8 +8,10 @@ accelerometers leave 1.2, and was up to five of these off. So the last passes fe
 that the whole log leads back to, with its biases, axes, arm and delay, and with the *prior* covariance, whose heading is any. What
 lies between the prior's values and those is an error that is known at the start. That is Gauss and Newton's method on the log, and
 the prior counts once. What a row is off by is not linear: by the end of such a loop places are off by kilometres
-(:mod:`truenorth.estimate.apart`). Of a log longer than gyros carry an attitude, or than a place by dead reckoning stays near, the
-first part is open; then the loop is closed.
+(:mod:`truenorth.estimate.apart`). Where a vehicle on tracks or with a wheel turns quickly, more than that is not linear: the loop
+comes to rest with a heading, an arm and a delay that make up for one another, or knows heading better than the closed loop does.
+Where the log speaks against such a loop it is not taken. Of a log longer than gyros carry an attitude, or than a place by dead
+reckoning stays near, the first part is open; then the loop is closed.
 
 Sources: as of :mod:`truenorth.alignment.transfer_nominal`, which does the same for a slave and its master.
 """
@@ -21,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.in_motion_passes import turn_between
+from truenorth.alignment.in_motion_passes import fits_worse, turn_between
 from truenorth.alignment.in_motion_start import Guess, backtracked, start_at
 from truenorth.alignment.in_motion_task import INTERVAL, OUTPUT, MovingTask
 from truenorth.alignment.transfer_nominal import carried_for
@@ -40,6 +42,8 @@ Array = NDArray[np.float64]
 SETTLED = 0.1  # of a sigma: a pass that moves attitude, arms and delays by less is the last
 SITS = (" lag", " lever arm")  # groups of each aid
 MOST = 12  # passes
+NEAR = 3.0  # sigmas, within which an open loop has found what the closed one has
+SURER = 0.9  # of the closed loop's sigma of heading: one that feeds nothing back knows no more
 LONGEST = 300.0  # s of a loop that feeds nothing back: a poor IMU's place is then off by a kilometre
 
 
@@ -82,7 +86,7 @@ def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
     Returns
     -------
     Track or None
-        None where it does not come to rest: no motion near the one found fits the log best.
+        None where it does not come to rest, or not at what the log says: no motion near the one found fits the log best.
     """
     used = task.aiding(gated=True)
     if any(source.loop > 0.0 for source in used):
@@ -117,7 +121,18 @@ def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
         )
     except DataError:  # the filter broke down
         return None
-    return last.found.track if last.moved < SETTLED else None
+    if last.moved >= SETTLED or _is_astray(last.found.track, track):
+        return None
+    return last.found.track
+
+
+def _is_astray(found: Track, track: Track) -> bool:
+    """Whether an open loop has another attitude than the closed one, or a surer heading, and the log speaks against it."""
+    off = rotation_vector_from_dcm(found.C_nb[-1] @ track.C_nb[-1].T)
+    open_sigma, sigma = found.sigma[-1, PHI], track.sigma[-1, PHI]
+    another = bool(np.any(np.abs(off) > NEAR * np.maximum(open_sigma, sigma)))
+    surer = bool(open_sigma[2] < SURER * sigma[2])
+    return (another or surer) and fits_worse(track, found)
 
 
 def _led_back(task: MovingTask, model: InsModel, track: Track, until: float) -> _Motion:

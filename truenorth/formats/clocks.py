@@ -19,6 +19,7 @@ from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.records import Guess
+from truenorth.records.pace import stretches
 
 Array = NDArray[np.float64]
 
@@ -140,7 +141,7 @@ def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str
     median, mean = float(np.median(steps)), float(np.mean(steps))
     uneven = float(np.mean((steps > 1.5 * median) | (steps == 0.0)))
     rounded = steps.min() == 0.0 and _even_but_for_digits(raw, mean)
-    if not rounded and (mean < BUNCHED * median or uneven < BUNCH_SHARE):
+    if not rounded and (mean < BUNCHED * median or uneven < BUNCH_SHARE or len(stretches(raw)) > 1):
         return
     unit = 1.0 if said is not None else size(stated) if stated is not None else None
     if unit is None:
@@ -174,6 +175,13 @@ def _even_but_for_digits(raw: Array, mean: float) -> bool:
 
 def _evenly(raw: Array, said: str | None, stated: str | None, rate: float, source: str, guesses: list[Guess]) -> Array:
     """Rows at a given rate, from where the stamps begin: no row is stamped before it was taken."""
+    found = stretches(raw)
+    if len(found) > 1:
+        row, ratio = found[1].first + 1, found[1].pace / found[0].pace
+        raise DataError(
+            f"{source}: from row {row} on the steps of the stamps are {ratio:.3g} times as long as before: the rate of the rows "
+            f"changes; expected one rate where a rate is given ({rate:g} Hz): leave it out, the stamps are followed then"
+        )
     steps = float(raw[-1] - raw[0]) / (len(raw) - 1)
     if said is None and stated is None:
         stated = min(("s", "ms", "us", "ns"), key=lambda unit: abs(np.log(steps * size(unit) * rate)))

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import UsageError
 from truenorth.core.numeric import is_number
 from truenorth.core.remembered import remembered
+from truenorth.quality.one_pace import at_one_pace, pace_findings
 from truenorth.quality.repeats import repeats_of
 from truenorth.quality.sampling import Finding
 from truenorth.records import Guess, ImuRecord
@@ -42,8 +43,8 @@ ONE_LENGTH = 0.2  # variance of the lengths of runs over that of chance; it is (
 
 
 def as_sampled(record: Any) -> ImuRecord:
-    """A record or a table as the record of the sensor's own samples; a record without held rows as it is."""
-    return at_own_rate(ImuRecord.of(record))
+    """A record or a table as the record of the sensor's own samples, at one rate; a record without held rows as it is."""
+    return at_one_pace(at_own_rate(ImuRecord.of(record)))
 
 
 def epoch_sampled(at: float | None, record: Any, sampled: ImuRecord) -> float | None:
@@ -99,9 +100,10 @@ def at_own_rate(record: ImuRecord) -> ImuRecord:
     )
 
 
-def held_findings(record: ImuRecord) -> list[Finding]:
-    """A note where rows that are held were left out."""
-    return [Finding("note", "repeated_rows", taken.why) for taken in record.taken_for if taken.what == HELD]
+def sampled_findings(record: ImuRecord) -> list[Finding]:
+    """A note where rows that are held were left out, and where the rate of the rows changes."""
+    held = [Finding("note", "repeated_rows", taken.why) for taken in record.taken_for if taken.what == HELD]
+    return held + pace_findings(record)
 
 
 def _even_clock(record: ImuRecord, first: NDArray[np.intp]) -> Array | None:

@@ -10,7 +10,8 @@ import numpy as np
 from truenorth.core.language import translated as _
 from truenorth.core.shown import Shown
 from truenorth.core.units import parse_unit
-from truenorth.quality.held import at_own_rate, held_findings
+from truenorth.quality.held import at_own_rate, sampled_findings
+from truenorth.quality.one_pace import at_one_pace
 from truenorth.quality.plausibility import Turning, check_plausibility
 from truenorth.quality.regimes import KINDS, Kind, MotionSummary, Regime, motion_summary
 from truenorth.quality.sampling import Finding, Sampling, check_sampling
@@ -219,12 +220,13 @@ def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
         Latitude; lets the earth's rate be checked by its vertical part too.
     """
     written = ImuRecord.of(record)
-    record = at_own_rate(written)
+    samples = at_own_rate(written)
+    record = at_one_pace(samples)
     motion = motion_summary(record)
     sampling, findings = check_sampling(record)
     turning, doubts = check_plausibility(record, motion, lat)
-    findings = [*findings, *doubts, *held_findings(record)]
-    sampling = replace(sampling, repeated_rows=sampling.repeated_rows + len(written) - len(record))
+    findings = [*findings, *doubts, *sampled_findings(record)]
+    sampling = replace(sampling, repeated_rows=sampling.repeated_rows + len(written) - len(samples))
     gyro_noise, accel_noise, rest = _noise_at_rest(record, motion, findings)
     findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
     return Inspection(

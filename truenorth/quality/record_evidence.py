@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truenorth.quality.alternation import alternation_evidence
 from truenorth.quality.codes import codes_evidence
 from truenorth.quality.force_line import line_evidence
-from truenorth.quality.held import held_findings
+from truenorth.quality.held import sampled_findings
 from truenorth.quality.hum import hum_evidence, moving_hum_evidence
 from truenorth.quality.plausibility import unit_findings
 from truenorth.quality.quantum import quantum_evidence
@@ -91,7 +91,7 @@ def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     """Evidence of faults of clock, logging and range; `turns`: whether the base turns."""
     _, findings = check_sampling(record)
     found = [*alternation_evidence(record), *rolled_over_evidence(record)]
-    found += [note(f"record.{held.code}", text=held.message) for held in held_findings(record)]
+    found += [note(f"record.{taken.code}", text=taken.message) for taken in sampled_findings(record)]
     for finding in findings:
         serious = finding.severity == "error" or (finding.code in TURNING and finding.severity != "note")
         # What an increment counts is lost where another is written in its place; a rate at rest is held without harm.

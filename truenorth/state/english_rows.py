@@ -11,6 +11,7 @@ RECORD = {
     "record.accel_level": "{text}",
     "record.no_gravity": "{text}",
     "record.repeated_rows": "{text}",
+    "record.rate_changes": "{text}",
     "record.no_noise": "{text}",
     "record.frozen": "{text}",
     "record.gaps": "{text}",
