@@ -85,6 +85,6 @@ def _other(pace: Array, than: Array | float) -> NDArray[np.bool_]:
 def _change(steps: Array, about: int, before: float, behind: float) -> int:
     """The first row of the later of two paces: fewest steps are on the wrong side of it."""
     near = slice(max(about - BLOCK, 0), min(about + 2 * BLOCK, len(steps)))
-    later = np.abs(np.log(steps[near] / behind)) < np.abs(np.log(steps[near] / before))
+    later = (steps[near] > math.sqrt(before * behind)) == (behind > before)
     wrong = np.concatenate([[0], np.cumsum(later)]) + np.concatenate([np.cumsum(~later[::-1])[::-1], [0]])
     return near.start + int(np.argmin(wrong)) + 1
