@@ -74,7 +74,9 @@ def stretches(time: Array) -> tuple[Stretch, ...]:
         if np.mean(of_rows) > EVEN * pace or np.any(_other(medians[first // BLOCK + 1 : end // BLOCK - 1], pace)):
             return (whole,)
         found.append(Stretch(first, float(np.mean(of_rows[of_rows < 1.5 * pace]))))
-    return tuple(found)
+    means = np.array([stretch.pace for stretch in found])
+    # Stamps of fewer digits from some time on have another median step, and the same mean.
+    return tuple(found) if np.all(_other(means[1:], means[:-1])) else (whole,)
 
 
 def _other(pace: Array, than: Array | float) -> NDArray[np.bool_]:
