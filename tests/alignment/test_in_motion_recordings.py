@@ -167,7 +167,8 @@ def test_receiver_led_away_while_the_vehicle_stands(standing):
 def test_car_dead_reckons_by_the_odometer(car):
     """150 s without GNSS, from the start that the aligner leads back to: the miss is what its sigma says.
 
-    Gyros whose scale is off by a per cent lose 3 deg in 300 deg of turns, 5 % of the way: no bar below sigma holds by right.
+    Gyros whose scale is off by a per cent lose 3 deg in 300 deg of turns, 5 % of the way: no bar below sigma holds by right. A wheel
+    shows no heading, so that of the start gets worse: place is known to no less than what the last heading makes of all the way.
     """
     imu, odometer, gnss, answer = car
     moving = answer.moving
@@ -181,7 +182,7 @@ def test_car_dead_reckons_by_the_odometer(car):
     assert moving.distance > 900.0
     P = result.track.P[-1][DP, DP][:2, :2]
     assert off[::-1] @ np.linalg.solve(P, off[::-1]) < 9.2  # of chi-square with 2 degrees of freedom 99 %
-    assert np.sqrt(np.trace(P)) < 0.1 * moving.distance
+    assert np.sqrt(np.trace(P)) < moving.distance * result.track.sigma[-1, 2]
 
 
 @pytest.mark.slow
