@@ -167,8 +167,8 @@ def test_receiver_led_away_while_the_vehicle_stands(standing):
 def test_car_dead_reckons_by_the_odometer(car):
     """150 s without GNSS, from the start that the aligner leads back to: the miss is what its sigma says.
 
-    Gyros whose scale is off by a per cent lose 3 deg in 300 deg of turns, 5 % of the way: no bar below sigma holds by right. A wheel
-    shows no heading, so that of the start gets worse: place is known to no less than what the last heading makes of all the way.
+    Gyros whose scale is off by a per cent lose 3 deg in 300 deg of turns, 5 % of the way: no bar below sigma holds by right. A
+    wheel shows no heading, so that of the start gets worse: the bar is what the last heading's sigma makes of all the way.
     """
     imu, odometer, gnss, answer = car
     moving = answer.moving

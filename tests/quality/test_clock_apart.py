@@ -1,6 +1,6 @@
 """A receiver on another clock: the lag against brute force, drives at any distance, and what shows none."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,28 +8,32 @@ import pytest
 import truenorth as tn
 from truenorth.aiding.aids import Gnss
 from truenorth.core.position import Position
-from truenorth.quality.clock_apart import clock_apart, course_rate, unexplained, yaw_rate
+from truenorth.quality import clock_apart as clocks
+from truenorth.quality.clock_apart import clock_apart, course_rate, on_its_clock, unexplained, yaw_rate
 from truenorth.records import GnssRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, straight, turn
+from truenorth.state.evidence import Evidence, note
 from truenorth.state.wording import sentences
 
 PLACE = Position.from_degrees(48.0, 11.0, 500.0)
 SPEC = imu_spec("industrial")
 
 
-def drive(seed, duration=240.0, speed=12.0, turning=(6.0, 15.0), even=False, velocities=True):
+def drive(
+    seed, duration=240.0, speed=12.0, turning=(6.0, 15.0), even=False, velocities=True, straights=(5, 25), imu=SPEC
+):
     """A car's log and its receiver's, on one clock; `even`: the same turn again and again."""
     rng = np.random.default_rng(seed)
     legs = [*straight(10.0), *accelerate(speed, 1.5, 0.0)]
     for _ in range(60):
-        by, rate, gone = rng.uniform(30, 120) * rng.choice([-1, 1]), rng.uniform(*turning), rng.uniform(5, 25)
+        by, rate, gone = rng.uniform(30, 120) * rng.choice([-1, 1]), rng.uniform(*turning), rng.uniform(*straights)
         by, rate, gone = (90.0, 10.0, 15.0) if even else (by, rate, gone)
         legs += [*straight(gone), *turn(np.radians(by), np.radians(rate))]
     motion = course(PLACE, [*legs, *straight(1000.0)], heading=rng.uniform(-3.0, 3.0))
-    record = simulate(motion, rate=50.0, duration=duration, imu=SPEC, seed=seed).record
+    record = simulate(motion, rate=50.0, duration=duration, imu=imu, seed=seed).record
     t = np.arange(0.55, duration - 10.0, 0.2)
     s = motion.states(t)
     off = rng.standard_normal((len(t), 3))
@@ -107,6 +111,45 @@ def test_one_who_does_not_move_shows_no_lag():
     assert clock_apart(record, shifted(still, 18.0)) is None
 
 
+def test_one_stamp_far_away_is_no_grid_of_billions():
+    _, record, gnss = drive(1)
+    wrong = replace(gnss, time=np.append(-1.7e9, gnss.time[1:]))
+    assert clock_apart(record, wrong) is None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """As much of an answer as is looked at."""
+
+    status: str
+    evidence: tuple[Evidence, ...] = ()
+
+
+@pytest.mark.parametrize(
+    ("late", "as_stamped", "shifted_by", "back", "taken"),
+    [
+        (3.0, "aligned", "aligned", 0.0, False),  # a nose that follows the course later, or a filter that finds 3 s
+        (3.0, "inconsistent", "aligned", 0.0, True),
+        (18.0, "inconsistent", "aligned", 0.4, True),
+        (18.0, "inconsistent", "inconsistent", 0.0, False),  # another drive: no clock is blamed
+        (18.0, "aligned", "aligned", 3.0, False),  # shifted in vain: the delay that is left says so
+    ],
+)
+def test_rows_are_shifted_where_the_answer_bears_it_out(monkeypatch, late, as_stamped, shifted_by, back, taken):
+    _, record, gnss = drive(1, 60.0)
+    monkeypatch.setattr(clocks, "clock_apart", lambda *_: late)
+
+    def solved(rows):
+        if rows is gnss:
+            return Answer(as_stamped)
+        assert rows.time[0] == gnss.time[0] - late
+        return Answer(shifted_by, (note("delay.early", name="GNSS", size=back),) if back else ())
+
+    answer = on_its_clock(solved, record, gnss)
+    assert ("clock.ahead" in [item.key for item in answer.evidence]) == taken
+    assert answer.status == (shifted_by if taken else as_stamped)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("late", [18.0, -18.0, 43211.4])
 def test_an_alignment_takes_the_receiver_by_its_own_clock(late):
@@ -128,7 +171,7 @@ def test_an_alignment_takes_the_receiver_by_its_own_clock(late):
 def test_navigation_takes_the_receiver_by_its_own_clock():
     motion, record, gnss = drive(9, 300.0)
     begin = tn.align(record.between(None, 150.0), None, SPEC, aid=[Gnss(gnss.between(None, 150.0))])
-    answer = tn.navigate(record, begin, aid=Gnss(shifted(gnss, 18.0)), imu=SPEC)
+    answer = tn.navigate(record.to_frame(), begin, aid=Gnss(shifted(gnss, 18.0)), imu=SPEC)  # a table, too
     assert answer.status == "navigated"
     off = (answer.track.v_n[-1] - motion.states(answer.track.time[-1:]).v_n[0]) / np.sqrt(
         np.diag(answer.track.P[-1])[3:6]

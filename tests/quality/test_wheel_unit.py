@@ -1,14 +1,19 @@
 """A wheel in another unit, or that counts the other way: named with a receiver and without; sound ones pass."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import truenorth as tn
-from tests.quality.test_clock_apart import SPEC, drive
+from tests.quality.test_clock_apart import PLACE, SPEC, drive
 from truenorth.aiding.aids import WHEEL, Odometer
 from truenorth.core.errors import DataError
 from truenorth.quality.wheel_unit import check_unit
-from truenorth.records import OdometerRecord
+from truenorth.records import GnssRecord, OdometerRecord
+from truenorth.simulation import simulate
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import accelerate, straight
 
 RATE = 10.0
 
@@ -76,6 +81,38 @@ def test_counts_that_have_nothing_to_do_with_the_drive_are_not_judged(drives):
         wander = np.cumsum(np.random.default_rng(seed).standard_normal(len(t)))
         for given in (gnss, None):
             check_unit(record, OdometerRecord(t, 3.0 * np.abs(wander), kind="speed"), given, WHEEL)
+
+
+@pytest.mark.parametrize(("speed", "noise"), [(1.0, 0.5), (1.3, 0.3), (1.4, 0.2), (0.6, 0.5)])
+def test_a_slow_vehicle_whose_receiver_is_noisy_passes(speed, noise):
+    """Rows that noise lifts beyond a threshold are faster than the wheel, all of them."""
+    for seed in range(4):
+        motion, record, gnss = drive(seed, speed=speed)
+        t, v = wheel(motion)
+        loud = gnss.v_n + noise * np.random.default_rng(seed).standard_normal(gnss.v_n.shape)
+        check_unit(record, OdometerRecord(t, v, kind="speed"), replace(gnss, v_n=loud), WHEEL)
+
+
+@pytest.mark.parametrize("receiver", [True, False])
+def test_a_wheel_aside_in_circles_passes(receiver):
+    """At 2.2 m aside, in turns of 5 m, it goes 1.4 times as far as the IMU."""
+    motion, record, gnss = drive(2, speed=3.0, turning=(30.0, 35.0), straights=(0.1, 1.0))
+    t, v = wheel(motion)
+    turning = np.interp(t, record.time, record.gyro[:, 2] / record.interval)
+    mounting = replace(WHEEL, lever_arm=np.array([2.2, 0.0, 0.0]), lever_arm_sigma=0.05)
+    wide = OdometerRecord(t, v + 2.2 * turning, kind="speed")
+    check_unit(record, wide, gnss if receiver else None, mounting)
+
+
+def test_a_receiver_on_another_clock_is_no_other_unit():
+    """It drives off from a village 60 s later than the wheel says."""
+    legs = [*straight(100.0), *accelerate(22.0, 1.4, 8.0), *straight(500.0)]
+    motion = course(PLACE, legs, heading=1.0, speed=8.0)
+    record = simulate(motion, rate=50.0, duration=240.0, imu=SPEC, seed=1).record
+    t = np.arange(70.0, 170.0, 0.2)
+    s = motion.states(t - 60.0)
+    gnss = GnssRecord(t, s.lat, s.lon, s.alt, v_n=s.v_n)
+    check_unit(record, OdometerRecord(*wheel(motion), kind="speed"), gnss, WHEEL)
 
 
 def test_the_alignment_and_the_navigation_say_so(drives):

@@ -35,6 +35,8 @@ BANK_LEVEL = math.radians(4.0)  # of a level from the mean force of a vehicle th
 WIDER_LEVEL, NARROWED, LEAST_HEADING = 10.0, 0.3, math.radians(3.0)
 HEADINGS = 12  # of the bank, all round
 LEVEL_TIME = 4.0  # s
+NEAR = 2.0  # s, within which a row of the wheel shows the velocity
+PUSH = 2.0  # m/s^2, one sigma of what a vehicle does before the wheel's first row
 ODOMETER_START, GNSS_START, UNKNOWN_START = 0.3, 0.3, 5.0  # m/s, one sigma of the velocity at the start
 
 
@@ -57,8 +59,9 @@ def coarse_guess(
     wheel: Mounting,
     antenna: Mounting,
 ) -> Guess:
-    """By optimisation-based alignment, with the odometer where there is one."""
-    if odometer is not None:
+    """By optimisation-based alignment, with the odometer where there is one that covers the log, or no receiver."""
+    ends = (float(record.time[0]), float(record.time[-1]))
+    if odometer is not None and all(_shows(odometer, gnss, time) for time in ends):
         coarse = odometer_alignment(record, odometer, position, wheel)
     else:
         assert gnss is not None
@@ -84,7 +87,7 @@ def guesses_all_round(
     force, axis, sigma = velocity[1], np.eye(3), BANK_LEVEL
     step = 2.0 * math.pi / HEADINGS
     at = record.time[0] - record.steps[0] + np.array([0.0, float(record.steps[:rows].sum())])
-    if odometer is not None:
+    if odometer is not None and _shows(odometer, gnss, float(at[0])):
         v_b = _velocity_b(odometer, wheel, at)
         force = force - (C[1] @ v_b[1] - C[0] @ v_b[0])
     elif gnss is not None:
@@ -126,16 +129,19 @@ def start_at(
     """The state before the first sample: velocity by the wheel through the guessed attitude, else by GNSS."""
     time = float(record.time[0] - record.steps[0])
     v_n, sigma = np.zeros(3), UNKNOWN_START
-    if odometer is not None:
+    by_wheel = odometer is not None and _shows(odometer, gnss, time)
+    if odometer is not None and by_wheel:
         v_b = _velocity_b(odometer, wheel, np.array([time]))[0]
-        v_n, sigma = guess.C_nb @ v_b, math.hypot(ODOMETER_START, wheel.angle_sigma * float(np.linalg.norm(v_b)))
+        since = PUSH * max(_apart(odometer, time) - odometer.interval, 0.0)
+        askew = wheel.angle_sigma * float(np.linalg.norm(v_b))
+        v_n, sigma = guess.C_nb @ v_b, math.hypot(ODOMETER_START, askew, since)
     elif gnss is not None:
         v_n, sigma = _by_gnss(gnss, antenna, time, float(record.time[-1]))
         sigma = math.hypot(sigma, _swing(record, antenna))
     # Slow parts of the biases are states of their own.
     angles = guess.level_sigma, guess.level_sigma, guess.heading_sigma
     P = prior_covariance(angles, sigma, position.sigma, spec.constant_variance)
-    if odometer is not None:  # what the wheel says turns with the attitude: dv = dv_I + v x phi
+    if by_wheel:  # what the wheel says turns with the attitude: dv = dv_I + v x phi
         turn = np.eye(STATES)
         turn[DV, PHI] = skew(v_n)
         P = turn @ P @ turn.T
@@ -160,6 +166,18 @@ def _swing(record: ImuRecord, antenna: Mounting) -> float:
     rate = increments(record)[0][:rows] / record.steps[:rows, None]
     arm = math.hypot(float(np.linalg.norm(antenna.lever_arm)), math.sqrt(3.0) * antenna.lever_arm_sigma)
     return arm * math.sqrt(float(np.mean(np.sum(rate**2, axis=1))))
+
+
+def _shows(odometer: OdometerRecord | VelocityRecord, gnss: GnssRecord | None, time: float) -> bool:
+    """Whether the wheel shows the velocity at a time: it has a row about then, or the receiver has none that is nearer."""
+    if gnss is None:
+        return True
+    return _apart(odometer, time) <= max(NEAR, _apart(gnss, time))
+
+
+def _apart(log: OdometerRecord | VelocityRecord | GnssRecord, time: float) -> float:
+    """From a time to the nearest row, s."""
+    return float(np.min(np.abs(log.time - time)))
 
 
 def _velocity_b(log: OdometerRecord | VelocityRecord, mounting: Mounting, at: Array) -> Array:

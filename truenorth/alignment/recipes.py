@@ -365,9 +365,9 @@ def align(
         answer = recipe(request)
         return replace(answer, evidence=(*answer.evidence, *unsaid)) if unsaid else answer
     except TypeError as error:
-        refused = [
-            f"{what} argument" for what in ("unexpected keyword", "multiple values for", "multiple values for keyword")
-        ]
+        refused = (
+            "unexpected keyword argument", "multiple values for argument", "multiple values for keyword argument",
+        )  # fmt: skip
         wrong = next((name for name in options if any(f"{said} '{name}'" in str(error) for said in refused)), None)
         if wrong is None:
             raise

@@ -48,6 +48,9 @@ Array = NDArray[np.float64]
 INTERVAL = 1.0  # s, over which both sides are averaged
 ITERATIONS = 3  # of the odometer's small terms; each is a thousandth of the one before
 LEAST_FIXES = 5
+HELD = 5.0  # s before the first row of a moving vehicle's odometer
+STANDS = 0.1  # m/s
+LEAST = 10.0  # s that an odometer must cover
 FIRST = 0.25  # of the time elapsed, that GNSS's noise at a single epoch shall not be in all pairs
 
 
@@ -74,9 +77,10 @@ def odometer_alignment(
     Raises
     ------
     DataError
-        The odometer does not cover the log.
+        The odometer begins or ends elsewhere; one that ends early shows the attitude by the log until then.
     """
     mounting = mounting or Mounting()
+    record = _covered(record, odometer, mounting)
     integrals = integrate(record, INTERVAL)
     moved = _wheel_displacement(record, odometer, mounting, integrals)  # (K+1, 3) in i, since the start
     T = integrals.intervals
@@ -167,6 +171,19 @@ def frames(time: Array, place: Array) -> Array:
     return np.asarray(C_en[0].T @ turn @ C_en)
 
 
+def _covered(record: ImuRecord, odometer: OdometerRecord | VelocityRecord, mounting: Mounting) -> ImuRecord:
+    """The record as far as the odometer goes; until it begins the vehicle goes on as at its first row, for some seconds at most."""
+    ends = odometer.time - mounting.late_at(odometer.time)
+    begin, start = record.time[0] - record.interval, ends[0] - odometer.interval
+    v = odometer.velocity_b(mounting.C_mb)[0]
+    if (start > begin + HELD and not np.linalg.norm(v) < STANDS) or ends[-1] < begin + LEAST:
+        raise DataError(
+            f"{odometer.source}: runs from {start:.3f} s to {ends[-1]:.3f} s, {record.source} from {begin:.3f} s to "
+            f"{record.time[-1]:.3f} s; expected an odometer that covers the log, on its clock: check it (`record.shifted`)"
+        )
+    return record if ends[-1] > record.time[-1] - INTERVAL else record.between(None, float(ends[-1]))
+
+
 def _wheel_displacement(
     record: ImuRecord, odometer: OdometerRecord | VelocityRecord, mounting: Mounting, integrals: InertialIntegrals
 ) -> Array:
@@ -174,11 +191,6 @@ def _wheel_displacement(
     ends = odometer.time - mounting.late_at(odometer.time)
     starts = ends - odometer.steps
     at = integrals.start + integrals.time
-    if starts[0] > at[0] + 2.0 or ends[-1] < at[-1] - 2.0:
-        raise DataError(
-            f"{odometer.source}: runs from {starts[0]:.3f} s to {ends[-1]:.3f} s, {record.source} from {at[0]:.3f} s to "
-            f"{at[-1]:.3f} s; expected an odometer that covers the log, on its clock: check it (`record.shifted`)"
-        )
     # Attitude half way through each row's interval.
     edges = np.concatenate([[at[0]], record.time])
     rows = np.clip(np.searchsorted(edges, 0.5 * (starts + ends)), 0, len(record))
@@ -188,6 +200,9 @@ def _wheel_displacement(
     steps = np.einsum("kij,kj->ki", C_ib, odometer.way_b(mounting.C_mb))
     path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     clock = np.concatenate([starts[:1], ends])
+    if starts[0] > at[0]:  # as at the first row until then
+        path = np.concatenate([path[:1] - steps[0] * (starts[0] - at[0]) / odometer.steps[0], path])
+        clock = np.concatenate([at[:1], clock])
     moved = np.stack([np.interp(at, clock, path[:, i]) for i in range(3)], axis=1)
     # The wheel's way less that of the lever arm's end about the IMU.
     moved -= integrals.C_ib @ mounting.lever_arm

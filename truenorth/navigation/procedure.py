@@ -169,17 +169,18 @@ def navigate(
         progress=progress,
     )
 
+    given, log = by_key(aid), as_sampled(record)
+
     def navigated(rows: GnssRecord | None) -> Navigation:
         aids = with_rows(given, rows)
         answer = by(imu=imu, aid=aids)
         if damping is not None or answer.status != "inconsistent":
             return answer
-        log, spec = as_sampled(record), start_of(start, imu)[1]
+        spec = start_of(start, imu)[1]
         spec = seen_in(with_rounding(spec, log, aided=bool(aids)), log)
         return as_noisy_as_its_rows(answer, log, spec, lambda x: by(imu=x, aid=aids))
 
-    given = by_key(aid)
-    return on_its_clock(navigated, record, record_of(given, Gnss))
+    return on_its_clock(navigated, log, record_of(given, Gnss))
 
 
 def _by_specification(

@@ -35,13 +35,15 @@ from truenorth.state.evidence import Evidence, note
 Array = NDArray[np.float64]
 
 SPANS = (1.0, 3.0, 10.0)  # s, of which means are taken: cars turn within seconds, ships within a minute
-NEAR = 2.5  # s: a delay up to which a filter finds by itself
+NEAR, FAR = 2.5, 10.0  # s: delays that a filter finds by itself, and that none finds
+LEFT = 1.5  # s: of whole seconds a delay that is left
 SLOWEST = 1.0  # m/s, below which a receiver's noise turns the course
 REVERSED = math.radians(90.0)  # of course within a span: it drives back, or stands
 LEAST = 30  # values that both have
 EXPLAINED = 0.2  # of the turns is left at the lag, at most,
 ELSEWHERE = 0.5  # and more than that anywhere else,
 AS_STAMPED = 0.35  # and than that as the stamps are: turns of a ship last longer than clocks are apart
+MOST = 1_000_000  # values: of more a stamp is wrong
 WHOLE = 0.5  # of the turns of one of them must lie where both are
 GPS_UTC = 18.0  # s, since 2017
 
@@ -77,23 +79,32 @@ def on_its_clock(solved: Callable[[GnssRecord | None], Answer], record: ImuRecor
     Returns
     -------
     Alignment or Navigation
-        Where rows are shifted its evidence says by how much. Where it is inconsistent all the same, and the one with rows as they
-        are is not, that one.
+        Rows are shifted where the answer with them as they are is inconsistent, or the clock is too far apart for a filter, and the
+        answer with shifted rows is neither inconsistent nor shifts them back. Its evidence says by how much.
     """
     late = None if gnss is None else clock_apart(record, gnss)
     if gnss is None or late is None:
         return solved(gnss)
+    if abs(late) > FAR:  # no filter finds such a delay, so that rows which are shifted in vain are inconsistent
+        return _shifted(solved, gnss, late) or solved(gnss)
+    try:
+        as_stamped = solved(gnss)
+    except (DataError, AlignmentError):
+        if (answer := _shifted(solved, gnss, late)) is None:
+            raise
+        return answer
+    return as_stamped if as_stamped.status != "inconsistent" else _shifted(solved, gnss, late) or as_stamped
+
+
+def _shifted(solved: Callable[[GnssRecord | None], Answer], gnss: GnssRecord, late: float) -> Answer | None:
+    """The answer with rows so much earlier, with what there is to say of it; None where it is inconsistent, or shifts them back."""
     try:
         answer = solved(gnss.shifted(-late))
     except (DataError, AlignmentError):
-        return solved(gnss)
-    if answer.status == "inconsistent":
-        try:
-            as_stamped = solved(gnss)
-        except (DataError, AlignmentError):
-            as_stamped = answer
-        if as_stamped.status != "inconsistent":
-            return as_stamped
+        return None
+    found = [item.figures.get("size", 0.0) for item in answer.evidence if item.key in ("delay.late", "delay.early")]
+    if answer.status == "inconsistent" or any(float(size) > LEFT for size in found):
+        return None
     key = "clock.ahead" if late > 0.0 else "clock.behind"
     said = [note(key, "offset", urgent=True, name="GNSS", sensor="gnss", size=abs(late), offset=-late)]
     said += [note("clock.gps_or_utc")] if abs(abs(late) - GPS_UTC) < 1.0 else []
@@ -173,6 +184,8 @@ def course_rate(gnss: GnssRecord, span: float) -> tuple[float, Array] | None:
     """Time of the first value and mean rates of the course over a span, rad/s, clockwise, one each half span; NaN where unknown."""
     time, velocity = _velocity(gnss, span)
     if len(time) < LEAST or time[-1] - time[0] < LEAST * 0.5 * span or np.median(np.diff(time)) > span:
+        return None
+    if time[-1] - time[0] > MOST * 0.5 * span:
         return None
     at = time[0] + 0.5 * span * np.arange(int((time[-1] - time[0]) / (0.5 * span)) + 1)
     v = np.stack([np.interp(at, time, component) for component in velocity.T], axis=1)
