@@ -8,8 +8,9 @@ import pytest
 import truenorth as tn
 from truenorth.aiding.aids import Gnss
 from truenorth.core.position import Position
-from truenorth.quality import clock_apart as clocks
-from truenorth.quality.clock_apart import clock_apart, course_rate, on_its_clock, unexplained, yaw_rate
+from truenorth.estimate import own_clock
+from truenorth.estimate.own_clock import on_its_clock
+from truenorth.quality.clock_apart import clock_apart, course_rate, unexplained, yaw_rate
 from truenorth.records import GnssRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import simulate
@@ -137,7 +138,7 @@ class Answer:
 )
 def test_rows_are_shifted_where_the_answer_bears_it_out(monkeypatch, late, as_stamped, shifted_by, back, taken):
     _, record, gnss = drive(1, 60.0)
-    monkeypatch.setattr(clocks, "clock_apart", lambda *_: late)
+    monkeypatch.setattr(own_clock, "clock_apart", lambda *_: late)
 
     def solved(rows):
         if rows is gnss:

@@ -160,7 +160,7 @@ def in_motion(r: Request) -> Alignment:
     """A vehicle under way, by odometer or velocity log, GNSS or both."""
     from truenorth.alignment.in_motion import align_in_motion
     from truenorth.errors.log import LogErrors, log_errors
-    from truenorth.quality.clock_apart import on_its_clock
+    from truenorth.estimate.own_clock import on_its_clock
 
     odometer, log, gnss = r.aids.get(Odometer), r.aids.get(VelocityLog), r.aids.get(Gnss)
     wheel = odometer or log

@@ -25,6 +25,7 @@ from truenorth.estimate.height_step import height_step_evidence
 from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.noisier import as_noisy_as_its_rows
+from truenorth.estimate.own_clock import on_its_clock
 from truenorth.estimate.poorer import growth_along, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
@@ -54,7 +55,6 @@ from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_overlap, check_places
-from truenorth.quality.clock_apart import on_its_clock
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.held import as_sampled

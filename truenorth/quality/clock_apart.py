@@ -20,95 +20,26 @@ its use here, and the limits, are ours.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
-from truenorth.core.errors import AlignmentError, DataError
 from truenorth.records import GnssRecord, ImuRecord
-from truenorth.state.evidence import Evidence, note
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
 SPANS = (1.0, 3.0, 10.0)  # s, of which means are taken: cars turn within seconds, ships within a minute
-NEAR, FAR = 2.5, 10.0  # s: delays that a filter finds by itself, and that none finds
-LEFT = 1.5  # s: of whole seconds a delay that is left
+NEAR = 2.5  # s: a delay up to which a filter finds by itself
+LONGEST = 7200.0  # s of each log, from its beginning, that are looked at
 SLOWEST = 1.0  # m/s, below which a receiver's noise turns the course
 REVERSED = math.radians(90.0)  # of course within a span: it drives back, or stands
 LEAST = 30  # values that both have
 EXPLAINED = 0.2  # of the turns is left at the lag, at most,
 ELSEWHERE = 0.5  # and more than that anywhere else,
 AS_STAMPED = 0.35  # and than that as the stamps are: turns of a ship last longer than clocks are apart
-MOST = 1_000_000  # values: of more a stamp is wrong
 WHOLE = 0.5  # of the turns of one of them must lie where both are
-GPS_UTC = 18.0  # s, since 2017
-
-
-class Judged(Protocol):
-    """An alignment or a navigation with its verdict."""
-
-    @property
-    def status(self) -> str:
-        """Of it."""
-        ...
-
-    @property
-    def evidence(self) -> tuple[Evidence, ...]:
-        """What its checks saw."""
-        ...
-
-
-Answer = TypeVar("Answer", bound=Judged)
-
-
-def on_its_clock(solved: Callable[[GnssRecord | None], Answer], record: ImuRecord, gnss: GnssRecord | None) -> Answer:
-    """The answer with a receiver's rows on the IMU's clock, where turns show that it is seconds apart; else with them as they are.
-
-    Parameters
-    ----------
-    solved : callable
-        The answer with these rows of the receiver.
-    record : ImuRecord
-    gnss : GnssRecord or None
-        None: there is no receiver.
-
-    Returns
-    -------
-    Alignment or Navigation
-        Rows are shifted where the answer with them as they are is inconsistent, or the clock is too far apart for a filter, and the
-        answer with shifted rows is neither inconsistent nor shifts them back. Its evidence says by how much.
-    """
-    late = None if gnss is None else clock_apart(record, gnss)
-    if gnss is None or late is None:
-        return solved(gnss)
-    if abs(late) > FAR:  # no filter finds such a delay, so that rows which are shifted in vain are inconsistent
-        return _shifted(solved, gnss, late) or solved(gnss)
-    try:
-        as_stamped = solved(gnss)
-    except (DataError, AlignmentError):
-        if (answer := _shifted(solved, gnss, late)) is None:
-            raise
-        return answer
-    return as_stamped if as_stamped.status != "inconsistent" else _shifted(solved, gnss, late) or as_stamped
-
-
-def _shifted(solved: Callable[[GnssRecord | None], Answer], gnss: GnssRecord, late: float) -> Answer | None:
-    """The answer with rows so much earlier, with what there is to say of it; None where it is inconsistent, or shifts them back."""
-    try:
-        answer = solved(gnss.shifted(-late))
-    except (DataError, AlignmentError):
-        return None
-    found = [item.figures.get("size", 0.0) for item in answer.evidence if item.key in ("delay.late", "delay.early")]
-    if answer.status == "inconsistent" or any(float(size) > LEFT for size in found):
-        return None
-    key = "clock.ahead" if late > 0.0 else "clock.behind"
-    said = [note(key, "offset", urgent=True, name="GNSS", sensor="gnss", size=abs(late), offset=-late)]
-    said += [note("clock.gps_or_utc")] if abs(abs(late) - GPS_UTC) < 1.0 else []
-    return replace(answer, evidence=(*answer.evidence, *said))  # type: ignore[type-var]  # a dataclass
 
 
 def clock_apart(record: ImuRecord, gnss: GnssRecord) -> float | None:
@@ -116,6 +47,7 @@ def clock_apart(record: ImuRecord, gnss: GnssRecord) -> float | None:
 
     The rest, and all that is less than some seconds, is a delay that a filter finds.
     """
+    record = record[: max(2, int(np.searchsorted(record.time, record.time[0] + LONGEST)))]
     for span in SPANS:
         course, yaw = course_rate(gnss, span), yaw_rate(record, span)
         if course is None or yaw is None:
@@ -130,9 +62,9 @@ def clock_apart(record: ImuRecord, gnss: GnssRecord) -> float | None:
 def _standing_out(late: Array, left: Array) -> float | None:
     """The lag that explains turns, s, where no other does and it is not about none."""
     best = int(np.argmin(left))
-    if left[best] > EXPLAINED or abs(late[best]) < NEAR or not np.isfinite(left[max(best - 1, 0) : best + 2]).all():
+    if not 0 < best < len(left) - 1 or not np.isfinite(left[best - 1 : best + 2]).all():
         return None
-    if not 0 < best < len(left) - 1:
+    if left[best] > EXPLAINED or abs(late[best]) < NEAR:
         return None
     first, last = best, best  # of the dip about it
     while first > 0 and left[first - 1] < 1.0:
@@ -183,9 +115,9 @@ def unexplained(course: Array, yaw: Array) -> tuple[Array, Array]:
 def course_rate(gnss: GnssRecord, span: float) -> tuple[float, Array] | None:
     """Time of the first value and mean rates of the course over a span, rad/s, clockwise, one each half span; NaN where unknown."""
     time, velocity = _velocity(gnss, span)
+    some = time <= time[:1] + LONGEST
+    time, velocity = time[some], velocity[some]
     if len(time) < LEAST or time[-1] - time[0] < LEAST * 0.5 * span or np.median(np.diff(time)) > span:
-        return None
-    if time[-1] - time[0] > MOST * 0.5 * span:
         return None
     at = time[0] + 0.5 * span * np.arange(int((time[-1] - time[0]) / (0.5 * span)) + 1)
     v = np.stack([np.interp(at, time, component) for component in velocity.T], axis=1)
@@ -217,9 +149,9 @@ def yaw_rate(record: ImuRecord, span: float) -> tuple[float, Array] | None:
     """The same of the gyros about the vertical, which the mean specific force shows; counterclockwise."""
     if record.duration < LEAST * 0.5 * span:
         return None
-    force = record.accel.mean(axis=0)
-    about = record.gyro @ (force / max(float(np.linalg.norm(force)), 1e-300))
-    turned = np.cumsum(about * record.steps if record.kind == "rates" else about)
+    dtheta, dvel = increments(record)
+    force = dvel.sum(axis=0)
+    turned = np.cumsum(dtheta @ (force / max(float(np.linalg.norm(force)), 1e-300)))
     at = record.time[0] + 0.5 * span * np.arange(int(record.duration / (0.5 * span)) + 1)
     angle = np.interp(at, record.time, turned)
     return float(at[1]), (angle[2:] - angle[:-2]) / span

@@ -24,10 +24,12 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.state.mounting import Mounting
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
 SPAN = 1.0  # s, of which means are taken
+LONGEST = 7200.0  # s of a log that are looked at
 SLOW = 2.0  # m/s of the receiver, below which noise is a part of the ratio
 FASTER = 0.5  # of the speed that the wheel reaches: such seconds are compared, chosen by the wheel alone
 LEAST = 30  # seconds that show it
@@ -73,6 +75,7 @@ def check_unit(record: ImuRecord, odometer: OdometerRecord, gnss: GnssRecord | N
     DataError
         With the ratio that was found, and the unit that it looks like.
     """
+    record = record[: max(2, int(np.searchsorted(record.time, record.time[0] + LONGEST)))]
     by_receiver, forward = _by_receiver(record, odometer, gnss, wheel), _by_imu(record, odometer)
     by_imu = None if forward is None else 1.0 / float(np.linalg.norm(forward))
     column = odometer.groups()["values"][0]
@@ -152,8 +155,7 @@ def _by_imu(record: ImuRecord, odometer: OdometerRecord) -> Array | None:
 
 def _means(record: ImuRecord, at: Array) -> Array:
     """(n, 6) mean rate and force over n spans, `at` their beginnings and then their ends."""
-    steps = record.steps[:, None] if record.kind == "rates" else 1.0
-    sums = np.cumsum(np.hstack([record.gyro * steps, record.accel * steps]), axis=0)
+    sums = np.cumsum(np.hstack(increments(record)), axis=0)
     begin, end = np.split(np.column_stack([np.interp(at, record.time, column) for column in sums.T]), 2)
     return np.asarray((end - begin) / SPAN)
 
