@@ -29,6 +29,7 @@ from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
+from truenorth.alignment.listing import as_listing
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.rate_step import rate_step_evidence
@@ -153,7 +154,7 @@ def align_base(
         )
 
     tell("looking at the motion")
-    task = make_task(record, position, at)
+    task = as_listing(make_task(record, position, at), spec)
     if np.linalg.norm(task.means.f_b) < NO_FORCE:
         raise no_attitude(record.source)
     chosen, why = _choose(method, task)
