@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import truenorth as tn
+from tests.quality.test_clock_apart import SPEC, drive, shifted
 from tests.runs import some
 from truenorth.aiding.aids import Gnss, Odometer
 from truenorth.core.errors import AlignmentError
@@ -34,15 +35,15 @@ def van():
     return sim, aiding["gnss"].record, aiding["odometer"].record
 
 
-def fed(run, record, gnss, odometer, chunk, *, until=math.inf, since=-math.inf, late=0.4):
-    """Push rows in the order in which they come: aiding rows some tenths of a second late."""
-    g = o = 0
+def fed(run, record, gnss, odometer, chunk, *, until=math.inf, since=-math.inf, late=0.4, ahead=0.0):
+    """Push rows in the order in which they come: aiding rows some tenths of a second late, the receiver's clock so far ahead."""
+    g, o = int(np.searchsorted(gnss.time + late, since, side="right")), 0
     for first in range(0, len(record), chunk):
         part = slice(first, first + chunk)
         now = min(record.time[part][-1], until)
         while g < len(gnss) and gnss.time[g] + late <= now:
             run.feeds["gnss"].push(
-                gnss.time[g], gnss.lat[g], gnss.lon[g], gnss.alt[g], v_n=gnss.v_n[g],
+                gnss.time[g] + ahead, gnss.lat[g], gnss.lon[g], gnss.alt[g], v_n=gnss.v_n[g],
                 position_sigma=None if gnss.position_sigma is None else gnss.position_sigma[g],
                 velocity_sigma=None if gnss.velocity_sigma is None else gnss.velocity_sigma[g],
             )  # fmt: skip
@@ -297,3 +298,26 @@ def test_rounding_grows_the_sigma_of_a_live_run_as_that_of_the_whole_log(van):
     assert np.array_equal(sigma["coarse"], sigma["in other chunks"])
     assert np.all(sigma["coarse"] > 2.0 * sigma["fine"])
     np.testing.assert_allclose(sigma["coarse"], whole.track.sigma[-1][DV], rtol=0.4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ahead", [18.0, *some([], [-18.0])])
+def test_a_receiver_on_another_clock_is_taken_by_it_from_the_solution_on_that_finds_it(ahead, tmp_path):
+    """Before, alignments found it, the navigation between them did not, and the status changed to and fro."""
+    _, record, gnss = drive(8, 160.0)
+    seen = []
+    with Aligner(imu=SPEC, aid=[GnssFeed()], kind=record.kind, background=False) as aligner:
+        for until in np.arange(30.0, 160.0, 2.0):
+            since = until - 2.0 if until > 30.0 else -math.inf
+            fed(aligner, record, gnss, None, 50, until=until, since=since, ahead=ahead)
+            seen.append(aligner.answer.status)
+        assert aligner.feeds["gnss"].offset == -ahead
+        first = seen.index("aligned")
+        assert set(seen[first:]) == {"aligned"}
+        found = aligner.finish()
+        aligner.save(tmp_path / "run")
+    again = Aligner.load(tmp_path / "run", background=False)
+    assert (again.feeds["gnss"].offset, again.clocks) == (-ahead, aligner.clocks)
+    whole = tn.align(record.between(None, until), imu=SPEC, aid=[Gnss(shifted(kept(gnss, until - 0.4), ahead))])
+    assert np.array_equal(found.C_nb, whole.C_nb)
+    assert [item.key for item in found.evidence] == [item.key for item in whole.evidence]

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import Evidence
 from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
@@ -53,8 +55,9 @@ GROWTH = 1.1  # times the length of the last solution, from which the next is du
 SHARE = 0.1  # of one core, for solutions
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
-    "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "failure", "solutions", "_due",
+    "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "failure", "solutions", "clocks", "_due",
 )  # fmt: skip
+APART = ("clock.ahead", "clock.behind", "clock.gps_or_utc")  # evidence that rows were moved by whole seconds
 NOWHERE = "no place is given, and no fix has come"
 
 
@@ -113,6 +116,7 @@ class Aligner:
         self.onward = Onward(kind)
         self.failure = ""
         self.solutions = 0
+        self.clocks: tuple[Evidence, ...] = ()  # by how much the clocks of feeds were apart, whose rows are moved since
         self._solving, self._newest_in = Solving(share, background), np.inf  # s: last row of the solution that runs
         self._due = self._then_due = -np.inf  # s: of the next solution, and of the one after the one that runs
         self._lock = threading.Lock()
@@ -218,9 +222,7 @@ class Aligner:
         if self._turned and not aids:
             raise AlignmentError("no angles of the indexer came; expected its encoder's rows")
         found = self._solve(self._record(aids, reach(aids) if left is None else left), aids)
-        if left is None:
-            self._take_over(found)
-        return found
+        return self._take_over(found) if left is None else found
 
     def navigator(self, **options: Any) -> Navigator:
         """Go on from the best alignment there is (:meth:`finish`), without a gap.
@@ -265,7 +267,7 @@ class Aligner:
         vars(found.onward).update(state.pop("onward"))
         vars(found).update(state)
         if (solution := found.onward.solution) is not None and under_way(solution):
-            found._take_over(solution)
+            found._go_on(solution)
         return found
 
     def close(self) -> None:
@@ -350,5 +352,16 @@ class Aligner:
         self.onward.newest.forget(self.log.end - RECENT)
         give_back()  # the rows that came meanwhile, and what the solution before held
 
-    def _take_over(self, found: Alignment) -> None:
+    def _take_over(self, found: Alignment) -> Alignment:
+        """Go on from a solution, and give it back with all that was found of clocks: rows that come are moved as its rows were."""
+        said = [item for item in found.evidence if item.key in APART]
+        for item in said:
+            if "offset" in item.figures:
+                self.feeds[str(item.figures["sensor"])].shift(float(item.figures["offset"]))
+        before, self.clocks = self.clocks, (*self.clocks, *said)
+        found = replace(found, evidence=(*found.evidence, *before)) if before else found
+        self._go_on(found)
+        return found
+
+    def _go_on(self, found: Alignment) -> None:
         self.onward.take_over(found, self.feeds, turned=self._turned, gap=self.log.last_gap)

@@ -47,6 +47,7 @@ class Feed(ABC):
         self.reading: dict[str, Any] = {}  # options of the reader of such logs
         self.left_out = 0  # rows without a finite time, without any number, that cannot be, repeated, of another clock
         self.failure = ""  # of the last rows that could not be read
+        self.offset = 0.0  # s, added to the time of each row: by so much its clock is behind the IMU's
         self.clear()
 
     def clear(self) -> None:
@@ -102,6 +103,8 @@ class Feed(ABC):
 
     def add(self, rows: Array) -> None:
         """Take rows ``time, columns`` in, any order; those that cannot be are counted and left out."""
+        if self.offset:
+            rows = np.column_stack([rows[:, 0] + self.offset, rows[:, 1:]])
         finite = np.where(np.isfinite(rows), rows, np.nan)
         with np.errstate(invalid="ignore"):
             sound = np.isfinite(rows[:, 0]) & np.isfinite(rows[:, 1:]).any(axis=1)
@@ -111,6 +114,12 @@ class Feed(ABC):
             found = found[[self._can_be(found[row : row + 1]) for row in range(len(found))]]
         self.left_out += len(rows) - len(found)
         self._waiting.append(found)
+
+    def shift(self, offset: float) -> None:
+        """Add this to the time of all rows, s, and of those that come."""
+        rows = self.rows.copy()
+        rows[:, 0] += offset
+        self._rows, self.offset = rows, self.offset + offset
 
     def _can_be(self, rows: Array) -> bool:
         """Whether a record takes these numbers, next to some that are sound; there may be columns of which they say nothing."""
