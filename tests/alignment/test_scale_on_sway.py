@@ -6,12 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.honesty import vehicles
+from benchmarks.honesty import foreign, vehicles
 from benchmarks.honesty.foreign import sensed
 from truenorth.alignment import align, procedure, scale_on_sway
 from truenorth.alignment.put_right import likelihood
 from truenorth.alignment.scale_on_sway import _as_measured, scale_on_sway_evidence
 from truenorth.campaign.fault_benches import BENCHES, misses
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
@@ -90,3 +92,43 @@ def test_a_motion_that_is_fitted_anew_makes_no_scale_factor_likelier(factor):
     given, put_right = fitted(force), fitted(factor * force)
     assert abs(likelihood(put_right) - likelihood(given)) > 100.0
     assert _as_measured(put_right, factor) == pytest.approx(likelihood(given))
+
+
+def mast(run):
+    """A mast in gusts, 120 s: tilts of a few arc minutes and accelerations of .1 m/s^2 in many tones of 1.5 to 8 s; and its end."""
+    rng = np.random.default_rng([63, run])
+    rate, lat = 50.0, 0.7
+    time = np.arange(round(120.0 * rate) + 1) / rate
+    fine = np.arange(2 * len(time) - 1) / (2.0 * rate)  # half a row is the middle of an interval
+    course = []
+    for _ in range(5):
+        count = rng.integers(3, 25)
+        tones = 2.0 * np.pi * rng.uniform(1.0 / 8.0, 1.0 / 1.5, count)
+        size = rng.rayleigh(1.0, count) / np.sqrt(count)
+        phase = rng.uniform(0.0, 2.0 * np.pi, count)
+        wave = size * np.sin(np.outer(fine, tones) + phase)
+        course.append((wave.sum(axis=1), -(wave * tones**2).sum(axis=1)))
+    tilts = np.radians(rng.uniform(0.01, 0.1, 2))
+    C = foreign.attitude(np.full(len(fine), rng.uniform(0.0, 6.28)), tilts[0] * course[0][0], tilts[1] * course[1][0])
+    turn = foreign.log(np.swapaxes(C[:-2:2], 1, 2) @ C[2::2]) * rate
+    middle = C[1::2]
+    turn += np.einsum("kji,j->ki", middle, foreign.RATE * np.array([0.0, np.cos(lat), np.sin(lat)]))
+    force = np.stack([rng.uniform(0.005, 0.1) * course[2 + j][1] for j in range(3)], axis=1)
+    force[:, 2] += gravity_of_place(lat, 0.0)
+    felt = np.hstack([turn, np.einsum("kji,kj->ki", middle, force[1::2])])
+    spec = imu_spec("tactical")
+    walks = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3) * np.sqrt(rate)
+    felt += np.sqrt(spec.bias_variance) * rng.standard_normal(6) + walks * rng.standard_normal(felt.shape)
+    return ImuRecord(time[1:] - 0.5 / rate, felt[:, :3], felt[:, 3:], source="mast"), Position(lat, 0.2), middle[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [0, 1, 2, 3, 4, 214])
+def test_masts_in_gusts_are_refused_for_no_scale_factor(run):
+    """Run 214 of 260 was: its motion fitted anew is likelier with 1.2 an epoch, with an accelerometer that reads less."""
+    record, place, C = mast(run)
+    answer = align(record, place, "tactical")
+    assert answer.status in ("aligned", "level_only")
+    off = rotation_vector_from_dcm(answer.C_nb @ C.T)[:2]
+    assert np.all(np.abs(off) < 4.0 * answer.euler_sigma[1:])
+    assert [item.kind for item in answer.evidence if "scale" in item.key] == (["hint"] if run == 214 else [])

@@ -10,6 +10,10 @@ So both compete (:mod:`~truenorth.alignment.put_right`). Of 16 logs with a scale
 once it was put right, of 13 sound ships and buoys half of it and more.
 
 In a sea that pushes a base as much as a scale factor would, the two are one, and nothing is said.
+
+A motion of many tones, as of a mast in gusts, is fitted by two lines on each axis, and fitted anew it may be likelier by itself:
+by up to 1.2 an epoch in 60 sound logs of masts, where true scale factors of 1 to 27 % gained 5 and more. Less than `SURE` is a
+hint: what it would do is in sigma, and no log is refused for it.
 """
 
 from __future__ import annotations
@@ -35,6 +39,7 @@ Array = NDArray[np.float64]
 
 ROUNDS = 4  # of alignments anew: the response of a log that is far off is linear in a part of the scale factor only
 LARGEST = 0.5  # of a correction in one round
+SURE = 3.0  # of twice the logarithm of the likelihood ratio, an epoch
 
 
 class _Response(NamedTuple):
@@ -93,7 +98,9 @@ def scale_on_sway_evidence(
         "heading": effect.heading,
         "level": effect.level,
     }
-    return [Evidence("bias.accel_scale", figures, "bounded", effect, ("specification", "units"))]
+    if gained > SURE * len(fine.integrals.intervals):
+        return [Evidence("bias.accel_scale", figures, "bounded", effect, ("specification", "units"))]
+    return [Evidence("bias.accel_may_scale", figures, "hint", effect, ("record_calmer",))]
 
 
 def _as_measured(fine: FineAlignment, factor: float) -> float:

@@ -51,6 +51,10 @@ OF_SENSORS = {
         "the {axis} accelerometer reads {scale:+.1%} ± {sigma:.1%} too much (likelihood ratio {ratio:.0f}); heading moves by "
         "{heading:angle}, level by {level:angle}"
     ),
+    "bias.accel_may_scale": (
+        "the base moves in more ways than its model, or the {axis} accelerometer reads {scale:+.1%} too much (likelihood ratio "
+        "{ratio:.0f}, too little to tell); heading would move by {heading:angle}, level by {level:angle}, which sigma allows for"
+    ),
     "bias.gyro_steps": (
         "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
         "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
