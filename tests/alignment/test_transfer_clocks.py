@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth.alignment.transfer_delay import likeliest_delay
+from truenorth.alignment.transfer_delay import delay_by_arm, find_delay, likeliest_delay
 from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.campaign.fault_benches import BENCHES
+from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.position import Position
+from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
 from truenorth.simulation.course import course
@@ -56,3 +58,28 @@ def test_what_happened_in_an_outage_has_no_course_in_time(run):
     heard = np.flatnonzero((master.time < begin) | (master.time > begin + 6.0))
     rows = {name: getattr(master, name)[heard] for name in ("time", "lat", "lon", "alt", "v_n", "C_nb")}
     assert parted_clocks(slave, replace(master, **rows), np.eye(3), 0.0) is None
+
+
+@pytest.mark.parametrize("along", [-0.2, 0.2])
+def test_an_arm_moves_the_delay_that_lengths_of_forces_show(along):
+    """As far as its part of the force says: a base that pitches in step with its pushes, near a master on time."""
+    t = np.arange(0.0, 120.0, 0.02)
+    slow, quick = 2.0 * np.pi / 7.0, 2.0 * np.pi / 3.0
+    push = 2.0 * np.sin(slow * t) + 1.5 * np.sin(quick * t + 0.4)
+    heave = np.sin(quick * t)
+    v_n = np.stack(
+        [0.0 * t, -2.0 / slow * np.cos(slow * t) - 1.5 / quick * np.cos(quick * t + 0.4), -np.cos(quick * t) / quick], 1
+    )
+    rate, turn = 0.2 * np.sin(quick * t + 1.0), 0.2 * quick * np.cos(quick * t + 1.0)
+    gyro, arm = np.stack([rate, 0.0 * t, 0.0 * t], axis=1), np.array([0.0, along, 0.0])
+    still = np.stack([0.0 * t, push, heave + GRAVITY_EQUATOR], axis=1)
+    added = np.cross(np.stack([turn, 0.0 * t, 0.0 * t], axis=1), arm) + np.cross(gyro, np.cross(gyro, arm))
+    master = MasterRecord(t[::5], v_n=v_n[::5])
+    at, off = (ImuRecord(t, gyro, force, "rates") for force in (still, still + added))
+    moved = find_delay(off, master, np.eye(3)).delay - find_delay(at, master, np.eye(3)).delay
+    said = delay_by_arm(off, master, arm, 0.0)
+    assert abs(moved) > 0.003
+    assert said == pytest.approx(abs(moved), rel=0.3)
+    assert (
+        delay_by_arm(off, master, 0.0 * arm, 0.5) > 0.24 * said
+    )  # of an arm that is uncertain by half a metre along each axis

@@ -160,7 +160,10 @@ def align_transfer(
     if what.translation is None:
         lever_arm_sigma = 0.0  # attitude does not see it
     said = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
-    said, notes = common_clock(slave, master, said)
+    # Most arms of which nothing is said are a metre or two: by a wider one no delay would stand out of what the arm explains.
+    usual = replace(said, lever_arm_sigma=min(lever_arm_sigma, LEVER_ARM_SIGMA))
+    clock, notes = common_clock(slave, master, usual)
+    said = replace(clock, lever_arm_sigma=lever_arm_sigma)
     errors = _errors(master, master_errors)
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise = first_noise(what, {**given, "attitude": attitude_noise})

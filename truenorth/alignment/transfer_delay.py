@@ -92,6 +92,33 @@ def likeliest_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> floa
     return float(master.time[0] - slave.time[0] - step * shifts[k])
 
 
+def delay_by_arm(slave: ImuRecord, master: MasterRecord, arm: Array, sigma: float) -> float:
+    """By how much (s) an arm moves the delay at which the lengths of both forces agree best; nothing where rates are compared.
+
+    What the arm adds to the slave's force, ``D r = w' x r + w x (w x r)``, moves the best agreement by the part of it that looks
+    like the force of another moment: ``<f', u D r>/<f', f'>``, with u the direction of the force and f its length.
+
+    Parameters
+    ----------
+    arm, sigma : (3,) array and float, m
+        From the master to the slave, slave axes, and its one-sigma along each axis: the whole arm counts, as no force is put right
+        by it before.
+    """
+    if master.C_nb is not None:
+        return 0.0
+    force, rate = _slave_means(slave, "force", GRID), _slave_means(slave, "rate", GRID)
+    length = np.linalg.norm(force, axis=1)
+    slope, spin = np.gradient(length, GRID), np.gradient(rate, GRID, axis=0)
+    window = np.full(round(WINDOW["force"] / GRID), GRID / WINDOW["force"])
+    power = float(slope @ slope)
+    if len(length) < len(window) or power == 0.0:
+        return 0.0
+    towards = force / np.maximum(length, 1e-12)[:, None]
+    added = [np.sum(towards * (np.cross(spin, e) + np.cross(rate, np.cross(rate, e))), axis=1) for e in np.eye(3)]
+    moved = np.array([slope @ np.convolve(one, window, "same") for one in added]) / power
+    return abs(float(moved @ arm)) + sigma * float(np.linalg.norm(moved))
+
+
 def agreement(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> float:
     """Correlation of both logs' motion where the master is late by this delay, s; -1 where they have nothing in common there."""
     both = _compared(slave, master, C_mb)
@@ -174,11 +201,15 @@ def _lasting(signal: Array) -> float:
 
 
 def _slave_signal(slave: ImuRecord, kind: str, step: float) -> Array:
+    mean = _slave_means(slave, kind, step)
+    return mean if kind == "rate" else np.linalg.norm(mean, axis=1, keepdims=True)
+
+
+def _slave_means(slave: ImuRecord, kind: str, step: float) -> Array:
     dtheta, dvel = increments(slave)
     whole = np.vstack([np.zeros((1, 3)), np.cumsum(dtheta if kind == "rate" else dvel, axis=0)])
     time = np.concatenate([[slave.time[0] - slave.interval], slave.time])
-    mean = _means(time, whole, slave.time[0], step, WINDOW[kind])
-    return mean if kind == "rate" else np.linalg.norm(mean, axis=1, keepdims=True)
+    return _means(time, whole, slave.time[0], step, WINDOW[kind])
 
 
 def _master_signal(master: MasterRecord, C_mb: Array, kind: str, step: float) -> Array:

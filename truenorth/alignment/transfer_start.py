@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.transfer_delay import WINDOW, agreement, find_delay, likeliest_delay, runs_backwards
+from truenorth.alignment.transfer_delay import (
+    WINDOW,
+    agreement,
+    delay_by_arm,
+    find_delay,
+    likeliest_delay,
+    runs_backwards,
+)
 from truenorth.alignment.transfer_filter import Assumed
 from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR, radii
@@ -50,7 +57,9 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     start, stop = master.time[0] - assumed.delay, master.time[-1] - assumed.delay
     apart = start >= slave.time[-1] or stop <= slave.time[0]
     miss = abs(found.delay - assumed.delay)
-    slack = limit("other delay") * max(assumed.delay_sigma, 0.5 * master.interval)
+    by_arm = delay_by_arm(slave, master, assumed.lever_arm, assumed.lever_arm_sigma)
+    sigma = math.hypot(assumed.delay_sigma, by_arm)
+    slack = limit("other delay") * max(sigma, 0.5 * master.interval)
     if found.sure and not apart and miss > AGAIN and _fits(slave, master, assumed, found.correlation):
         return assumed, ()
     if found.sure and (apart or miss > slack):
@@ -60,7 +69,7 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
                 f"a shift of {found.delay:.3f} s: the rows of one of the logs run backwards: write them in the order in which they "
                 "were measured"
             )
-        return replace(assumed, delay=found.delay), (
+        return replace(assumed, delay=found.delay, delay_sigma=sigma), (
             f"the master's stamps are {found.delay:.3f} s behind the slave's clock by their motion (correlation "
             f"{found.correlation:.3f}), where {assumed.delay:.3f} s were given: the found delay is taken",
         )

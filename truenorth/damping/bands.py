@@ -48,7 +48,9 @@ def widest(bands: Sequence[Bands]) -> Bands:
     return Bands(*(np.max(sizes, axis=0) for sizes in zip(*bands, strict=True)))
 
 
-def network_bands(course: Track, loop: Loop, whole: Filter, mu: Array, *, log: bool) -> Bands:
+def network_bands(
+    course: Track, loop: Loop, whole: Filter, mu: Array, *, log: bool, absent: NDArray[np.bool_] | None = None
+) -> Bands:
     """Of an INS with this loop: errors, network states, biases and errors of the log together.
 
     Parameters
@@ -61,6 +63,8 @@ def network_bands(course: Track, loop: Loop, whole: Filter, mu: Array, *, log: b
         How far it is damped at the epochs.
     log : bool
         It is fed with the log; else damping is internal.
+    absent : (K+1,) array of bool, optional
+        Epochs at which the log says nothing: in steps without a row the INS goes on undamped.
     """
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
     coarse = course[::stride]
@@ -68,6 +72,10 @@ def network_bands(course: Track, loop: Loop, whole: Filter, mu: Array, *, log: b
     F, _ = linearised(coarse, model)
     M, N = loop.matrices(F, coarse.position[1:, 0], np.interp(coarse.time[1:], course.time, mu))
     n, first = M.shape[1], MOTION.stop
+    there = np.ones(len(course)) if absent is None or not log else np.where(absent, 0.0, 1.0)
+    rows = _rows_in_steps(0.5 * (there[1:] + there[:-1]), stride, len(coarse) - 1)
+    M[rows == 0.0, :, DV] += N[rows == 0.0]
+    N[rows == 0.0] = 0.0
     count = n + model.states - first
     A, inputs = np.zeros((len(coarse) - 1, count, count)), np.zeros((len(coarse) - 1, count, 2))
     A[:, :n, :n], inputs[:, :n] = M, N
@@ -83,8 +91,8 @@ def network_bands(course: Track, loop: Loop, whole: Filter, mu: Array, *, log: b
     Phi, Gamma = transition_and_input(A, inputs, coarse.interval)
     P = np.zeros((count, count))
     P[np.ix_(placed, placed)] = P0
-    white = whole.sigma**2 * course.interval / coarse.interval * log
-    Q = white * (Gamma @ np.swapaxes(Gamma, -1, -2))
+    white = whole.sigma**2 / np.maximum(rows, 1.0) * log
+    Q = white[:, None, None] * (Gamma @ np.swapaxes(Gamma, -1, -2))
     Q[:, placed[:, None], placed] += model.noise_of(coarse.interval, 0.5 * (coarse.v_n[1:] + coarse.v_n[:-1]))
     joint = _covariances(Phi, Q, P)
     errors = np.diagonal(joint, axis1=1, axis2=2)[:, MOTION]
@@ -125,10 +133,10 @@ def filter_bands(
     joint, P1 = np.zeros((count, count)), one.P0
     joint[e, e] = whole.P0
     P2 = None if two is None else two.P0
-    R1 = one.sigma**2 / stride * np.eye(2)
     absent = np.zeros(len(course), dtype=bool) if absent is None else absent
     silent = silences(absent, max(1, round(SETTLING / course.interval)))[::stride]
-    absent = absent[::stride]
+    many = _rows_in_steps(np.where(absent[1:], 0.0, 1.0), stride, len(coarse) - 1)
+    R1 = one.sigma**2 / np.maximum(many, 1.0)[:, None, None] * np.eye(2)
     # Until filter 1 has settled nothing goes into filter 2.
     silent = silent | (np.arange(-1, len(coarse) - 1) * coarse.interval < SETTLING - 1e-6)
     share, apart = (None, None) if fused is None else (fused[0][::stride], fused[1][::stride])
@@ -141,26 +149,26 @@ def filter_bands(
     differs[:, x1.start : x1.start + MOTION.stop] = np.eye(MOTION.stop)
     for begin in range(0, len(coarse) - 1, PART):
         part = coarse[begin : begin + PART + 1]
-        rows = slice(begin + 1, begin + len(part))
+        rows, steps = slice(begin + 1, begin + len(part)), slice(begin, begin + len(part) - 1)
         mean = 0.5 * (part.v_n[1:] + part.v_n[:-1])
         _, Phi = linearised(part, whole.model)
         Q, H = np.broadcast_to(whole.model.noise_of(part.interval, mean), Phi.shape), whole.rows(part)
         F1, Phi1 = linearised(part, one.model)
         Q1, H1 = one.model.noise_of(part.interval, mean)[:1], one.rows(part)
-        first, P1 = _gains(Phi1, Q1, H1, R1, absent[rows], P1)
+        first, P1 = _gains(Phi1, Q1, H1, R1[steps], many[steps] == 0.0, P1)
         A, G = np.zeros((len(part) - 1, count, count)), np.zeros((len(part) - 1, count, 2))
         B = np.zeros((len(part) - 1, count, n))  # of the noise that drives the errors
         A[:, e, e], B[:, e] = Phi, np.eye(n)
         A[:, x1, e], A[:, x1, x1] = first.gain @ H @ Phi, first.step
         B[:, x1], G[:, x1] = first.gain @ H, first.gain
         if two is not None and P2 is not None:
-            R2 = two.sigma**2 / (stride if two.overlap else 1) * np.eye(2)
+            R2 = two.sigma**2 / (stride if two.overlap else 1) * np.eye(2)[None]
             second, P2 = _gains(Phi1, Q1, F1[:, DV, : two.model.states], R2, silent[rows], P2)
             K2 = second.gain / part.interval
             A[:, x2], B[:, x2], G[:, x2] = K2 @ A[:, v1], K2 @ B[:, v1], K2 @ G[:, v1]
             A[:, x2, x2] += second.step
             A[:, x2, v1] -= K2
-        driven = B @ Q @ np.swapaxes(B, -1, -2) + G @ R1 @ np.swapaxes(G, -1, -2)
+        driven = B @ Q @ np.swapaxes(B, -1, -2) + G @ R1[steps] @ np.swapaxes(G, -1, -2)
         joints = _covariances(A, driven, joint)[1:]
         joint = joints[-1]
         seen = np.repeat(off[None, DV], len(part) - 1, axis=0)
@@ -174,6 +182,11 @@ def filter_bands(
             residual[rows] = _given(residual[rows], with_log, *(column[:, DV] for column in known))
     residual[1:] += whole.sigma**2
     return _spread(course, coarse, errors, residual)
+
+
+def _rows_in_steps(there: Array, stride: int, count: int) -> Array:
+    """(count,) rows of the log in each coarse step, from those in each interval of the course; a sparse log has none in most."""
+    return np.asarray(there[: count * stride].reshape(count, stride).sum(axis=1))
 
 
 def _covariances(A: Array, Q: Array, P: Array) -> Array:
@@ -194,7 +207,7 @@ def _variances(H: Array, P: Array, other: Array | None = None) -> Array:
 def _gains(Phi: Array, Q: Array, H: Array, R: Array, absent: NDArray[np.bool_], P: Array) -> tuple[Gains, Array]:
     """Of a filter's updates at these epochs, and its covariance after them."""
     z = np.where(absent[:, None], np.nan, np.zeros(2))
-    system = LinearSystem(Phi, Q, H, R[None], z, np.zeros(len(P)), P)
+    system = LinearSystem(Phi, Q, H, R, z, np.zeros(len(P)), P)
     found = kalman(system, history="full")
     return filter_gains(system, found), np.asarray(found.P[-1])
 
@@ -209,10 +222,16 @@ def _given(variance: Array, covariance: Array, weight: Array, apart: Array, spre
 
 
 def _spread(course: Track, coarse: Track, errors: Array, residual: Array) -> Bands:
-    """Roots of these variances, at all epochs of the course."""
+    """Roots of these variances, at all epochs of the course.
+
+    Where in a step the log's first row comes, and moves the velocity, the step does not say: it has the larger of its ends.
+    """
+    stride = max(1, round(coarse.interval / course.interval))
+    after = np.minimum(-(-np.arange(len(course)) // stride), len(coarse) - 1)
+    before = np.minimum(np.arange(len(course)) // stride, len(coarse) - 1)
 
     def at_all(variance: Array) -> Array:
         sigma: Array = np.sqrt(np.maximum(variance, 0.0))
-        return np.stack([np.interp(course.time, coarse.time, column) for column in sigma.T], axis=1)
+        return np.asarray(np.maximum(sigma[before], sigma[after]))
 
     return Bands(at_all(errors), at_all(residual))

@@ -343,7 +343,10 @@ def _by_network(
     mu = found.mu if found is not None and damper.switching else np.ones(len(course))
     x = network_correction(course, loop, used, start=at, ramp=damper.ramp, mu=mu)
     by_log = used is not None
-    bands = widest([network_bands(course[start:], loop, whole, mu[start:], log=by_log) for whole in wholes])
+    absent = None if used is None else np.asarray(np.isnan(used[start:]).any(axis=1))
+    bands = widest(
+        [network_bands(course[start:], loop, whole, mu[start:], log=by_log, absent=absent) for whole in wholes]
+    )
     if found is not None:  # a manoeuvre's part alone, as if the rest of the velocity were known
         still = course.v_n[:, :2] - found.manoeuvre
         added = network_correction(course, loop, still, start=at, ramp=damper.ramp, mu=mu)

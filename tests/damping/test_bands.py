@@ -1,0 +1,69 @@
+"""Bands of a log that is sparse or falls silent: at rows that come between the epochs of the covariances, and without any."""
+
+import numpy as np
+import pytest
+
+from tests.damping.marine_case import ideal_and_truth
+from tests.damping.test_filters import SIGMA, WALKS, reference
+from truenorth.damping.bands import filter_bands, network_bands
+from truenorth.damping.filters import Filter, run_filters
+from truenorth.damping.loop import Loop
+from truenorth.damping.networks import NO_NETWORK, second_order
+from truenorth.errors.log import LogErrors
+from truenorth.errors.marine import MarineModel
+
+STEP = 10  # epochs between the covariances of a course of 1 Hz
+FIRST = 3  # epoch of the log's first row: no covariance stands there
+SILENT = slice(600, 1200)  # epochs
+SETTLED = 300  # epoch from which the errors grow little within a step
+
+
+@pytest.fixture(scope="module")
+def course():
+    return ideal_and_truth(interval=1.0, hours=0.5)[1]
+
+
+def sparse(course, silence=slice(0, 0)):
+    """Epochs without a row, of a log with one in ten."""
+    absent = np.arange(len(course)) % STEP != FIRST
+    absent[silence] = True
+    return absent
+
+
+@pytest.fixture(scope="module")
+def whole():
+    model = MarineModel(**WALKS, groups=LogErrors(0.3, 3600.0).groups())
+    return Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
+
+
+@pytest.mark.parametrize("silence", [slice(0, 0), SILENT])
+def test_bands_of_a_filter_by_a_sparse_log_are_its_own(course, silence):
+    """The covariance of truth and filter together gives back the filter's, where their models are one.
+
+    A row counts at the end of its step, from which the errors have no time to grow: while level is unsure that is a
+    quarter, later less than a tenth.
+    """
+    kind, absent = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05), sparse(course, silence)
+    rows = reference(course, 0.0)
+    rows[absent] = np.nan
+    own = run_filters(course, rows, start=0, kinds={"one": kind})["one"].sigma[:, :7]
+    bands = filter_bands(course, kind, kind, absent=absent).errors
+    np.testing.assert_allclose(bands[SETTLED::STEP], own[SETTLED::STEP], rtol=0.1)
+    assert np.all(bands[SETTLED:] > 0.9 * own[SETTLED:])
+    assert np.all(bands[1:] > 0.75 * own[1:])
+
+
+def test_a_network_without_rows_is_an_undamped_ins(course, whole):
+    """Of all errors; the log's own do not enter."""
+    mu, never = np.ones(len(course)), np.ones(len(course), dtype=bool)
+    bands = network_bands(course, Loop(second_order(0.5)), whole, mu, log=True, absent=never)
+    free = network_bands(course, Loop(NO_NETWORK), whole, mu, log=False)
+    np.testing.assert_allclose(bands.errors, free.errors, rtol=1e-9)
+
+
+def test_a_network_takes_the_noise_of_the_rows_that_there_are(course, whole):
+    """One row in ten is worth ten of which each is a root of ten as noisy."""
+    mu, loop = np.ones(len(course)), Loop(second_order(0.5))
+    few = network_bands(course, loop, whole, mu, log=True, absent=sparse(course))
+    many = network_bands(course, loop, Filter(whole.model, whole.P0, np.sqrt(10.0) * whole.sigma), mu, log=True)
+    np.testing.assert_allclose(few.errors, many.errors, rtol=1e-9)
