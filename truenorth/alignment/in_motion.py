@@ -47,6 +47,7 @@ from truenorth.estimate.noisier import as_noisy_as_its_rows
 from truenorth.estimate.poorer import ALONE, BIASES, poorer_evidence, poorer_rivals, poorer_tracks
 from truenorth.estimate.rivals import Rival, jump_evidence, misfit, noise_evidence, wandering_evidence
 from truenorth.estimate.spiked import spike_evidence
+from truenorth.estimate.stepping import stepping_rivals
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.aid_noise import LOUD, noise_factors
 from truenorth.quality.gnss import gnss_evidence
@@ -285,9 +286,7 @@ def _seen(
         found += [*rest_evidence(task, track), *led_at_rest_evidence(task, track)]
         found += half_turn_evidence(task, track, gated=gated)
 
-    def other(record: ImuRecord) -> Track:
-        return replace(task, record=record).run(guess, gated=gated)
-
+    other = partial(_of_record, task, guess, gated)
     found += jump_evidence(other, track, task.record)
     if task.gnss is not None:
         led = [partial(_of_receiver, less, guess, gated) for less in (task, *task.without_slow_errors())]
@@ -303,9 +302,12 @@ def _seen(
         return task.with_spec(spec).run(guess, gated=gated)
 
     def of_another_course() -> list[Rival]:
-        warming = warming_rivals(other, track, task.record, task.spec)
+        courses = warming_rivals(other, track, task.record, task.spec)
+        if gyrocompassed:  # by motion alone heading is not what a gyro's bias makes of it
+            less = [partial(_of_record, fewer, guess, gated) for fewer in task.without_slow_errors()]
+            courses += stepping_rivals([other, *less], track, task.record, task.spec)
         kinds = ALONE | BIASES if gyrocompassed else ALONE
-        return warming + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, kinds))
+        return courses + poorer_rivals(track, poorer_tracks(of_another_imu, track, task.spec, kinds))
 
     found += poorer_evidence(of_another_imu, track, task.spec)
     span = task.record.duration
@@ -314,6 +316,10 @@ def _seen(
 
 def _of_model(task: MovingTask, guess: Guess, gated: bool, model: InsModel) -> Track:
     return replace(task, model=model).run(guess, gated=gated)
+
+
+def _of_record(task: MovingTask, guess: Guess, gated: bool, record: ImuRecord) -> Track:
+    return replace(task, record=record).run(guess, gated=gated)
 
 
 def _of_receiver(task: MovingTask, guess: Guess, gated: bool, log: GnssRecord) -> Track:

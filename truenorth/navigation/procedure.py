@@ -41,6 +41,7 @@ from truenorth.navigation.given import (
     late_rows,
     logs_of_speed,
     looked_at,
+    mounted_as,
     record_of,
     said_of,
     taken_over,
@@ -48,6 +49,7 @@ from truenorth.navigation.given import (
 )
 from truenorth.navigation.gyro_moment import gyros_of_another_moment
 from truenorth.navigation.passes import COARSE, Plan, filtered, quick_swing
+from truenorth.navigation.recentred import recentred
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, second_look
 from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
@@ -229,6 +231,7 @@ def _by_specification(
     if isinstance(wheel := given.get(Odometer.key), Odometer):
         check_unit(plan.record, wheel.record, record_of(given, Gnss), wheel.mounting or wheel.usual)
     tell("navigating")
+    plan = _about_its_heading(plan, given)
     done, loose = (
         filtered_by_possible_arm(plan, given, smooth) if check_clocks else (filtered(plan, given, smooth), None)
     )
@@ -260,6 +263,15 @@ def _by_specification(
         return judged_navigation(result, counted_once(evidence), least)
     tell(f"damping: {damping.method}")
     return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, fixes)
+
+
+def _about_its_heading(plan: Plan, given: Mapping[str, Aid]) -> Plan:
+    """The plan from the heading that the log shows, where its start was unsure (:mod:`truenorth.navigation.recentred`)."""
+    free = {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()}
+    aiding = plan.sources(mounted_as(given, free))
+    if not aiding:
+        return plan
+    return replace(plan, start=recentred(lambda s: replace(plan, start=s).run(aiding, smooth=True), plan.start))
 
 
 def _damped(

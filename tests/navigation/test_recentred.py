@@ -1,0 +1,86 @@
+"""A start whose heading is unsure is turned to where the log shows it; one that is sure, or that nothing shows, stays."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.honesty.circling import drawn_start, received
+from benchmarks.honesty.driving import STRAIGHT, ship
+from truenorth.alignment.in_motion_passes import turn_between
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track
+from truenorth.navigation import navigate
+from truenorth.navigation.by_start import UP
+from truenorth.navigation.recentred import WIDER, recentred
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import ideal_log, simulate
+from truenorth.state.track import Track
+
+DURATION, UNSURE = 300.0, math.radians(15.0)
+
+
+def turned(start, angle, sigma=UNSURE):
+    """The start with a heading that is off by an angle, and one sigma of it."""
+    P = start.P.copy()
+    P[UP], P[:, UP] = 0.0, 0.0
+    P[UP, UP] = sigma**2
+    return replace(start, C_nb=dcm_from_euler(angle, 0.0, 0.0) @ start.C_nb, P=P)
+
+
+def sailed(seed, grade="consumer"):
+    rng, spec = np.random.default_rng(seed), imu_spec(grade)
+    motion = ship(rng, DURATION)
+    record = simulate(ideal_log(motion, rate=25.0, duration=DURATION), imu=spec, seed=seed).record
+    start = drawn_start(motion, spec, rng)
+    return motion, spec, record, start, received(motion, DURATION, 1.0, rng)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("angle", [-40.0, 30.0])
+def test_a_wrong_heading_is_turned_to_what_the_log_shows(angle):
+    motion, spec, record, start, aid = sailed(3)
+    model = InsModel.from_spec(spec)
+    begun = turned(start, math.radians(angle), math.radians(25.0))
+
+    def run(at):
+        used = aid.sources("free")
+        track = navigate_track(record, at, model, used, interval=0.2, every=5)
+        return replace(
+            track, smoothing=lambda: navigate_track(record, at, model, used, interval=0.2, every=5, smooth=True)
+        )
+
+    found = recentred(run, begun)
+    off = turn_between(found.C_nb, motion.states(np.array([0.0])).C_nb[0])
+    sigma = math.sqrt(found.P[UP, UP])
+    assert sigma < math.radians(25.0)
+    assert abs(off) < 4.0 * sigma / WIDER
+
+
+def test_a_sure_heading_is_not_asked_of_the_log():
+    start = sailed(1)[3]
+    assert recentred(lambda _: pytest.fail("asked"), start) is start
+
+
+def test_a_heading_that_the_log_does_not_show_stays():
+    """The smoother leaves half of what was said: not a third."""
+    start = turned(sailed(1)[3], 0.0)
+    P = np.tile(0.25 * start.P, (2, 1, 1))
+    zero = np.zeros((2, 3))
+    still = Track(
+        np.arange(2.0), np.tile(start.C_nb, (2, 1, 1)), zero, zero, np.zeros((2, 15)), P, InsModel().layout, ()
+    )
+    assert recentred(lambda _: still, start) is start
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_attitude_of_a_ship_that_began_unsure_is_within_four_sigmas(seed):
+    motion, spec, record, start, aid = sailed(seed)
+    begun = turned(start, UNSURE * np.random.default_rng([seed, 1]).standard_normal())
+    answer = navigate(record, begun, aid=aid, imu=spec, deflection=STRAIGHT)
+    off = answer.track.errors_against(Track.along(motion.states(answer.time))) / answer.track.sigma[:, :9]
+    assert answer.status == "navigated"
+    assert np.abs(off[:, :3]).max() < 4.0
