@@ -84,6 +84,15 @@ def test_a_base_that_lists_is_aligned(run, grade):
         assert np.all(np.abs(off) < 4.0 * sigma)
 
 
+@pytest.mark.parametrize(
+    ("method", "status"),
+    [("analytic", "inconsistent"), ("states10", "inconsistent"), *some([("oba", "aligned")], [("kf", "aligned")])],
+)
+def test_methods_of_a_still_base_are_contradicted_by_one_that_lists(method, status):
+    """The mean rate is the earth's and the tilt's: heading by it is 500 sigmas off."""
+    assert align(log(1, tilt=DEGREE)[0], PLACE, "navigation", method=method).status == status
+
+
 def test_one_whose_accelerometer_drifts_is_refused():
     record, _ = log(3, drift=DEGREE)
     assert align(record, PLACE, "navigation").status == "inconsistent"

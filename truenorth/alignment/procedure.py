@@ -78,6 +78,7 @@ SHORTEST = 1.0  # s: below that no mean is worth its name
 NO_NORTH = "the gyros do not see the earth turn: the mean force levels, nothing finds north"
 NO_FORCE = 1e-6  # m/s^2, mean specific force that shows no vertical: accelerometers that are dead
 SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
+STILL = ("analytic", *STATIONARY)  # take the base for one that does not turn: one that lists contradicts them
 GOES = 10.0  # m: of the way from where a base was in the mean, that still passes for sway
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 RECENT = 60.0  # s: whose own motion of the base is that of the epoch
@@ -154,7 +155,8 @@ def align_base(
         )
 
     tell("looking at the motion")
-    task = as_listing(make_task(record, position, at), spec)
+    task = make_task(record, position, at)
+    task = task if method in STILL else as_listing(task, spec)
     if np.linalg.norm(task.means.f_b) < NO_FORCE:
         raise no_attitude(record.source)
     chosen, why = _choose(method, task)
