@@ -156,9 +156,9 @@ def align_base(
 
     tell("looking at the motion")
     task = make_task(record, position, at)
-    task = task if method in STILL else as_listing(task, spec)
     if np.linalg.norm(task.means.f_b) < NO_FORCE:
         raise no_attitude(record.source)
+    task = task if method in STILL else as_listing(task, spec)
     chosen, why = _choose(method, task)
     tell(f"aligning: {chosen}")
     means = check_means(task.means, position.lat, task.gravity)
