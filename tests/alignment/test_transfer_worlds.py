@@ -151,7 +151,11 @@ def test_what_lasts_below_a_usual_noise_of_a_master_is_no_contradiction(size, fo
 
 def test_errors_of_the_master_by_name():
     given = master_errors("level=0.3 arcmin, heading=2 arcmin,velocity=0.05 m/s,correlation_time=200 s")
-    assert given == MasterErrors(0.3 * ARCMIN, 2.0 * ARCMIN, 0.05, 0.3 * ARCMIN, 0.05, 200.0)
+    assert given == MasterErrors(
+        0.3 * ARCMIN, 2.0 * ARCMIN, 0.05, 0.3 * ARCMIN, 0.05, 200.0, heading_drift=2.0 * ARCMIN
+    )  # drifts that are left out are as large as the constants, but one that was said holds for heading too
+    both = master_errors("level=0.3 arcmin,heading=2 arcmin,attitude_drift=0.1 arcmin")
+    assert both.attitude_drifts == pytest.approx([0.1 * ARCMIN] * 3)
     for wrong, message in (
         ("level=1", "no unit"),
         ("tilt=1 arcmin", "expected one of"),
@@ -201,7 +205,7 @@ def test_a_masters_own_sigmas_make_sigma_absolute(tmp_path):
     master = replace(master, attitude_sigma=attitude_sigma, velocity_sigma=np.full((rows, 3), 0.1))
     own = own_errors(master.attitude_sigma, master.velocity_sigma)
     whole = np.hypot(
-        [own.level, own.heading, own.velocity], [own.attitude_drift, own.attitude_drift, own.velocity_drift]
+        [own.level, own.heading, own.velocity], [own.attitude_drift, own.heading_drift, own.velocity_drift]
     )
     assert whole == pytest.approx([4.0 * arcmin, 60.0 * arcmin, 0.1])
     write_record(master, tmp_path / "master.csv")

@@ -134,6 +134,9 @@ def test_a_constant_and_a_drift_are_one_process():
     constant, drift = np.array([3e-4, 3e-4, 2e-3, *[0.05] * 3]), np.repeat([1e-4, 0.1], 3)
     np.testing.assert_allclose(stays, constant**2 + drift**2)
     np.testing.assert_allclose(dynamics.noise[STATES:], 2.0 * drift**2 / 90.0)
+    turned = TransferModel(master=replace(own, heading_drift=5e-4)).groups[ATTITUDE_ERROR]  # of a size of its own
+    dynamics = dynamics_of((turned,), np.zeros(STATES))
+    np.testing.assert_allclose(dynamics.noise[STATES:], 2.0 * np.square([1e-4, 1e-4, 5e-4]) / 90.0)
     steady = TransferModel(master=replace(own, attitude_drift=0.0)).groups[ATTITUDE_ERROR]
     assert np.isinf(steady.lasts).all()
     with pytest.raises(UsageError, match="correlation time"):

@@ -17,6 +17,7 @@ from tests.runs import few_and_all, some
 from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
 from truenorth.quality import inspect, motion_summary
+from truenorth.quality.sampling import check_sampling
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
 
@@ -373,3 +374,13 @@ def test_gravity_of_another_size_is_no_bias_of_an_unknown_imu(factor, words):
     answer = tn.align(replace(record, accel=factor * record.accel), Position(LAT, 0.0))
     assert answer.status == "inconsistent"
     assert words in " ".join(answer.reasons)
+
+
+@pytest.mark.parametrize(("unit", "named"), [(1.0, False), (1e-3, True)])
+def test_a_row_a_second_of_increments_weighs_its_own_time(unit, named):
+    """Gravity times a second is 9.8 m/s: time is in seconds. A thousand rows a second, counted in milliseconds, weigh 9.8 mm/s."""
+    rng = np.random.default_rng(0)
+    accel = unit * np.array([0.0, 0.0, 9.8]) + 1e-3 * rng.standard_normal((200, 3))
+    record = ImuRecord(np.arange(200.0), 1e-4 * rng.standard_normal((200, 3)), accel, "increments", "a log")
+    _, findings = check_sampling(record)
+    assert ("time_unit" in {finding.code for finding in findings}) is named

@@ -20,6 +20,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged, noise_in
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer
 from truenorth.alignment.transfer_axes import same_axes, slave_axes
+from truenorth.alignment.transfer_drifts import delay_evidence, drifting_rivals
 from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, Matching, transfer_filter
 from truenorth.alignment.transfer_passes import found_in_passes
 from truenorth.alignment.transfer_shaken import shaken_evidence
@@ -57,9 +58,6 @@ LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m
 # Of an IMU of whose place on the master's vehicle nothing is said.
 ON_MASTER = Mounting(lever_arm_sigma=VEHICLE_ARM, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
 DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
-PASSES = 3  # that fit the noise of the master's rows, and the attitude to linearise with
-PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
-LEAST = 0.1  # of the noise to begin with: less is not believed
 SHORTEST = 5.0  # s
 USUAL, POORER = "industrial", "consumer"  # presets of a slave of which nothing is said
 RIVAL_DELAY = 0.2  # s, one sigma of a master's delay where gyros may be late
@@ -233,7 +231,14 @@ def _aligned(
         _, begun = hand_over(slave, master, own, other, said, noise, position=position)
         return run(part, model=own, start=begun)
 
-    seen = _seen(slave, master, errors, said) + _rivals(part, run, track, model, start, spec, of_another_imu)
+    def of_another_master(errors: MasterErrors) -> Track:
+        """The same of a master with such errors, which are estimated."""
+        own = replace(_model(spec, said, what, flexure, errors, model.axes), considered=False)
+        _, begun = hand_over(slave, master, own, spec, said, noise, position=position)
+        return run(part, model=own, start=begun, nominal=found.nominal.with_states(own.states))
+
+    seen = _seen(slave, master, errors, said)
+    seen += _rivals(part, run, track, model, start, spec, said, of_another_imu, of_another_master)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
     track = as_said_together(track, model, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
@@ -270,7 +275,9 @@ def _rivals(
     model: TransferModel,
     start: Start,
     spec: ImuSpec,
+    said: Assumed,
     of_another_imu: Callable[[ImuSpec], Track],
+    of_another_master: Callable[[MasterErrors], Track],
 ) -> list[Evidence]:
     """What else would explain the log; `run` with a slave, a model and a start, or the same of another IMU.
 
@@ -288,7 +295,8 @@ def _rivals(
 
     def of_another_course() -> list[Rival]:
         poorer = poorer_rivals(track, poorer_tracks(of_another_imu, track, spec, SLOW | BIASES))
-        return warming_rivals(partial(run, model=model, start=start), track, part, spec) + poorer
+        drifting = drifting_rivals(of_another_master, track, model)
+        return warming_rivals(partial(run, model=model, start=start), track, part, spec) + poorer + drifting
 
     found = noise_evidence(other, track, model, part)
     found += wandering_evidence(other, track, model, spec, part.duration, warming=of_another_course)
@@ -303,6 +311,7 @@ def _rivals(
         return of_translation(run(record, model=model, start=wide))
 
     first, free = of_translation(track), shifted(part)
+    found += delay_evidence(first, free, said)
     # What a delay that is less known explains is no delay of the gyros.
     first = free if likelihood_ratio(first.residuals, free.residuals) > 0.0 else first
     return found + gyro_delay_evidence(shifted, first, part)
@@ -337,7 +346,7 @@ def _model(
     if what.translation != "velocity":
         of_rows = replace(of_rows, velocity=0.0, velocity_drift=0.0)
     if not what.attitude and what.translation != "acceleration":
-        of_rows = replace(of_rows, attitude_drift=0.0, level=0.0, heading=0.0)
+        of_rows = replace(of_rows, attitude_drift=0.0, heading_drift=None, level=0.0, heading=0.0)
     bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
     model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, of_rows, axes)
     if what.translation == "position":  # place and velocity are against a master whose own velocity error wanders

@@ -57,6 +57,10 @@ class Nominal:
             off[mounting] = rotation_vector_from_dcm(seat @ own.T)
         return off
 
+    def with_states(self, count: int) -> Nominal:
+        """The same with so many states: those behind its own are assumed to be zero."""
+        return replace(self, values=np.concatenate([self.values, np.zeros(count - len(self.values))]))
+
     def corrected(self, x: Array, mounting: slice | None) -> Nominal:
         """Without errors (n,) of it."""
         values = self.values + x

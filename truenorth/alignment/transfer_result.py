@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors.axes import standing
+from truenorth.state.layout import DV, PHI
 from truenorth.state.limits import is_estimated
 from truenorth.state.track import Residuals
 
@@ -118,6 +119,17 @@ class Transfer:
     def mounting_estimated(self) -> NDArray[np.bool_]:
         """(3,) whether the data showed this angle."""
         return is_estimated(self.mounting_sigma, self.mounting_prior)
+
+    def less_sure(self, phi: Array, velocity: float) -> Transfer:
+        """The same with a covariance (3, 3) of attitude added, rad^2, and sigmas of velocity so many times as large.
+
+        What is added is an error of its own; the attitude against the master has it too.
+        """
+        P = self.P.copy()
+        P[PHI, PHI] += phi
+        P[DV, DV] += np.diag((velocity**2 - 1.0) * np.diag(P)[DV])
+        more = np.sqrt(np.diag(phi))[[2, 0, 1]]
+        return replace(self, P=P, relative_sigma=np.hypot(self.relative_sigma, more))
 
     def summary(self) -> dict[str, Any]:
         """Flat, in datasheet units, ready for JSON."""

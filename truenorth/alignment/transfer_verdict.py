@@ -44,7 +44,8 @@ def judge_transfer(
     """
     evidence = list(of_master)
     evidence += _rejected(transfer)
-    evidence += _misses(transfer, track, assumed)
+    known = {item.key for item in evidence}  # a delay that is far off comes out between that and what was said
+    evidence += [item for item in _misses(transfer, track, assumed) if item.key not in known]
     lopsided = _lopsided(track, transfer)
     evidence += [] if lopsided else _lasting(transfer, least)
     if lopsided:

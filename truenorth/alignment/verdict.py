@@ -93,6 +93,8 @@ def claimed(answer: Alignment) -> Effect:
     if answer.moving is not None:
         variance = np.diag(answer.moving.P)
         velocity, position = float(np.sqrt(variance[DV].max())), float(np.sqrt(variance[DP].max()))
+    if answer.transfer is not None:  # its place is the master's
+        velocity = float(np.sqrt(np.diag(answer.transfer.P)[DV].max()))
     return Effect(sigma, level_sigma(answer), velocity, position)
 
 
@@ -112,7 +114,8 @@ def azimuth_sigmas(answer: Alignment) -> tuple[float, float]:
 def grown(answer: Alignment, added: Effect) -> Alignment:
     """The same answer with an independent error in its covariance, its floor and its history.
 
-    On the move velocity and position, and what navigation goes on from, have it too.
+    On the move velocity and position, and what navigation goes on from, have it too; of a slave its velocity, its place being its
+    master's.
     """
     if added == NO_EFFECT:
         return answer
@@ -120,9 +123,11 @@ def grown(answer: Alignment, added: Effect) -> Alignment:
     history = answer.history
     if history is not None:
         history = replace(history, phi_covariance=history.phi_covariance + more, phi_floor=history.phi_floor + more)
-    moving, position = answer.moving, answer.position
+    moving, position, transfer, own = answer.moving, answer.position, answer.transfer, claimed(answer)
+    if transfer is not None:
+        fast = math.hypot(1.0, added.velocity / own.velocity) if own.velocity > 0.0 else 1.0
+        transfer = transfer.less_sure(more, fast)
     if moving is not None:
-        own = claimed(answer)
         fast, far = (
             math.hypot(1.0, size / sigma) if sigma > 0.0 else 1.0
             for size, sigma in ((added.velocity, own.velocity), (added.position, own.position))
@@ -136,6 +141,7 @@ def grown(answer: Alignment, added: Effect) -> Alignment:
         phi_floor=answer.phi_floor + more,
         history=history,
         moving=moving,
+        transfer=transfer,
         position=position,
     )
 

@@ -114,8 +114,8 @@ def live(
     if clock not in ("device", "arrival"):
         raise UsageError(f"--clock {clock!r}: expected device or arrival")
     place = where.position()
-    if place is None and aids.gnss is None:
-        raise UsageError("no place; expected --lat (and --lon), or --gnss SOURCE")
+    if place is None and aids.gnss is None and aids.master is None:
+        raise UsageError("no place; expected --lat (and --lon), --gnss SOURCE, or --master SOURCE with positions")
     if turned.indexer is not None and navigate:
         raise UsageError("--navigate with --indexer: an IMU that is turned in its body does not navigate; expected one")
     goal = None if until is None else parse(until, "angle")

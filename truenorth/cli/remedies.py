@@ -34,6 +34,7 @@ OPTIONS = {
     "transfer.delay": "--delay",
     "transfer.lever_arm": "--lever-arm",
     "transfer.mounting": "--mounting",
+    "master_drift": "--master-sigma",
     "transfer_geometry": "--axes, --lever-arm, --mounting, --delay",
     "flexure": "--flexure",
     "log_error": "--log-drift",

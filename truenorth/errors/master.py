@@ -75,6 +75,9 @@ class MasterErrors:
         Constant, of each axis.
     attitude_drift, velocity_drift : float, rad and m/s
         Of each axis: a stationary Gauss-Markov process.
+    heading_drift : float or None, rad
+        The same of heading, which neither gravity nor a velocity at a steady course holds as they hold level; None: as
+        `attitude_drift`.
     correlation_time : float, s
         Of the drift.
     filter : float, s
@@ -88,9 +91,10 @@ class MasterErrors:
     velocity_drift: float = 0.0
     correlation_time: float = 300.0
     filter: float = FILTER_SIGMA
+    heading_drift: float | None = None
 
     def __post_init__(self) -> None:
-        sigmas = (self.level, self.heading, self.velocity, self.attitude_drift, self.velocity_drift, self.filter)
+        sigmas = (self.level, self.heading, self.velocity, *self.attitude_drifts, self.velocity_drift, self.filter)
         if not all(0.0 <= x < math.inf for x in sigmas):
             raise UsageError(f"{self}: expected sigmas of zero or more")
         if not self.correlation_time > 0.0:
@@ -98,13 +102,25 @@ class MasterErrors:
                 f"correlation time of the master's errors {self.correlation_time:g} s; expected above zero"
             )
 
+    @property
+    def attitude_drifts(self) -> tuple[float, float, float]:
+        """Sigmas of the drift about east, north and up, rad."""
+        level = self.attitude_drift
+        return level, level, level if self.heading_drift is None else self.heading_drift
+
 
 MASTERS = {
     "navigation": MasterErrors(
         math.radians(0.3 / 60), math.radians(2.0 / 60), 0.05, math.radians(0.3 / 60), 0.05, correlation_time=300.0
     ),
     "tactical": MasterErrors(
-        math.radians(3.0 / 60), math.radians(20.0 / 60), 0.2, math.radians(3.0 / 60), 0.2, correlation_time=300.0
+        math.radians(3.0 / 60),
+        math.radians(20.0 / 60),
+        0.2,
+        math.radians(3.0 / 60),
+        0.2,
+        correlation_time=300.0,
+        heading_drift=math.radians(5.0 / 60),  # gyros of 1 deg/h, over the time for which it lasts
     ),
 }  # by grade: an aided INS of a ship or an aircraft
 DIMENSIONS = {
@@ -113,6 +129,7 @@ DIMENSIONS = {
     "velocity": "speed",
     "attitude_drift": "angle",
     "velocity_drift": "speed",
+    "heading_drift": "angle",
     "correlation_time": "time",
     "filter": "time",
 }
@@ -142,6 +159,8 @@ def master_errors(given: MasterErrors | str | None) -> MasterErrors:
             f"({', '.join(DIMENSIONS)}), such as level=0.3 arcmin,heading=2 arcmin,velocity=0.05 m/s"
         )
     found = {name: parse(text, DIMENSIONS[name]) for name, text in values.items()}
+    if "attitude_drift" not in found and "heading" in found:
+        found.setdefault("heading_drift", found["heading"])
     found.setdefault("attitude_drift", found.get("level", 0.0))
     found.setdefault("velocity_drift", found.get("velocity", 0.0))
     return MasterErrors(**found)
@@ -167,9 +186,8 @@ def own_errors(attitude_sigma: Array | None, velocity_sigma: Array | None) -> Ma
         heading, level = _median(attitude_sigma[:, 0]), _median(attitude_sigma[:, 1:])
     if velocity_sigma is not None:
         velocity = _median(velocity_sigma)
-    drift = min(level, heading)
     return MasterErrors(
-        level * half, math.sqrt(max(heading**2 - 0.5 * drift**2, 0.0)), velocity * half, drift * half, velocity * half
+        level * half, heading * half, velocity * half, level * half, velocity * half, heading_drift=heading * half
     )
 
 
@@ -225,12 +243,12 @@ class TransferModel(Walks):
             found.append(Group(FLEXURE, np.array(self.flexure_sigma), frequency=self.flexure_beta, unit="rad"))
         found += self.axes
         for name, constant, drift, unit in (
-            (VELOCITY_ERROR, np.full(3, of.velocity), of.velocity_drift, "m/s"),
-            (ATTITUDE_ERROR, np.array([of.level, of.level, of.heading]), of.attitude_drift, "rad"),
+            (VELOCITY_ERROR, np.full(3, of.velocity), np.full(3, of.velocity_drift), "m/s"),
+            (ATTITUDE_ERROR, np.array([of.level, of.level, of.heading]), np.array(of.attitude_drifts), "rad"),
         ):
             sigma = np.hypot(constant, drift)
             if sigma.any():
-                lasts = of.correlation_time * sigma**2 / drift**2 if drift > 0.0 else math.inf
+                lasts = of.correlation_time * np.divide(sigma**2, drift**2, out=np.full(3, np.inf), where=drift > 0.0)
                 found.append(Group(name, sigma, lasts, considered=self.considered, unit=unit))
         return {group.name: group for group in found}
 

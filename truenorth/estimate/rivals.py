@@ -69,6 +69,7 @@ class Rival(NamedTuple):
     figures: Mapping[str, Figure]
     effect: Effect
     chance: float = 1.0  # that it is right
+    suspect: str = "specification"  # what would be at fault
 
 
 def wandering_evidence(
@@ -121,7 +122,7 @@ def wandering_evidence(
     for other in found:
         shown = shown.or_larger(other.effect)
         effect = effect.or_larger(other.effect.times(math.sqrt(other.chance)))
-    return [rival(best.key, best.figures, best.ratio, effect, "specification", shown)]
+    return [rival(best.key, best.figures, best.ratio, effect, best.suspect, shown)]
 
 
 def rival(
@@ -269,7 +270,9 @@ def misfit(residuals: Iterable[Residuals]) -> float:
     return sum(float(np.sum(np.where(r.rows > 0, r.nis, 0.0)) + 2.0 * np.nansum(np.log(r.sigma))) for r in residuals)
 
 
-def likelihood_ratio(first: Iterable[Residuals], rival: Iterable[Residuals], *, one_model: bool = False) -> float:
+def likelihood_ratio(
+    first: Iterable[Residuals], rival: Iterable[Residuals], *, one_model: bool = False, whitened: bool = False
+) -> float:
     """Twice the logarithm of the likelihood ratio, of each source as far as its measurements are independent.
 
     Measurements that both take count: outliers choose no model. A source whose innovations are ``f`` times as large as they
@@ -283,6 +286,9 @@ def likelihood_ratio(first: Iterable[Residuals], rival: Iterable[Residuals], *, 
         and both count with the one ``S`` between them: ``(e_1^2 - e_2^2) / S``, to first order in ``ln S_1 - ln S_2``. A wheel that
         is less noisy than it says would else prefer whatever narrows S: of a sound car, an eighth of whose S is noise, by 2 % in
         2400 rows or a ratio of 43.
+    whitened : bool
+        The rival is a slow error, which colours innovations itself: what colour it takes out of them is no reason to believe
+        them less. The share is that of the whiter ones.
     """
     total = 0.0
     others = {r.name: r for r in rival}
@@ -298,6 +304,9 @@ def likelihood_ratio(first: Iterable[Residuals], rival: Iterable[Residuals], *, 
         if one_model:
             narrower *= 0.5 * (e**2 + (other.innovation[of_other] / other.sigma[of_other]) ** 2)
         share = whiteness(e[:, np.isfinite(e).all(axis=0)]).growth ** 2
+        if whitened:
+            left = other.innovation[of_other] / other.sigma[of_other]
+            share = min(share, whiteness(left[:, np.isfinite(left).all(axis=0)]).growth ** 2)
         total += float(r.nis[at].sum() - other.nis[of_other].sum() + np.nansum(narrower)) / share
     return total
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
 from truenorth.quality.again import Again, rows_again
 from truenorth.quality.packets import exchanged_packets
@@ -134,17 +135,25 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
     elif rms > limit("slight jitter") * record.interval:
         text = f"the time steps scatter by {rms * 1e3:.3g} ms RMS about {record.interval * 1e3:.4g} ms"
         findings.append(Finding("note", "jitter", text))
-    if record.interval >= 1.0 or record.interval < 2e-5:
+    if (record.interval >= 1.0 or record.interval < 2e-5) and not _weighs(record):
         guess = "milliseconds or ticks" if record.interval >= 1.0 else "another unit"
         findings.append(
             Finding(
                 "warning",
                 "time_unit",
-                f"a row every {record.interval:.4g} s; expected 1 to 10,000 rows a second: time is probably in "
+                f"a row every {record.interval:.4g} s; expected more than 1 and up to 10,000 rows a second: time is probably in "
                 f"{guess}; convert it to seconds or give `rate`",
             )
         )
     return rms, largest
+
+
+def _weighs(record: ImuRecord) -> bool:
+    """Whether increments of velocity are those of gravity over the time that the stamps say: it is in seconds then."""
+    if record.kind != "increments":
+        return False
+    force = float(np.median(np.linalg.norm(record.accel[1:] / record.steps[1:, None], axis=1)))
+    return 0.5 < force / GRAVITY_EQUATOR < 2.0
 
 
 def _again(record: ImuRecord, again: Again) -> Finding:

@@ -78,6 +78,11 @@ OF_SENSORS = {
         "chance as a likelihood ratio of {ratio:.0f}, a sound log gives {chance:.0f} at most); heading moves by {heading:angle}, "
         "level by {level:angle}"
     ),
+    "rival.master_heading": (
+        "a master whose heading drifts by some {size:angle} within the log, more than was said, fits the measurements better "
+        "(likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, "
+        "level by {level:angle}"
+    ),
     "rival.accels_warm_up": (
         "accelerometer biases that move together by up to {size:ug|} ug, as sensors that warm up within {time:.0f} s, fit the "
         "measurements better (as rare by chance as a likelihood ratio of {ratio:.0f}, a sound log gives {chance:.0f} at most); "

@@ -47,6 +47,7 @@ REMEDIES = {
     "transfer.lever_arm": "check the lever arm",
     "transfer.mounting": "check the mounting",
     "level_specification": "give a specification of the IMU, or its calibration",
+    "master_drift": "say how far the master's heading drifts, or give the slave's right specification",
     "slave_specification": "give the right specification",
     "without_jump": "align a part without the jump, which may be an error of the master",
     "match_velocity": (
