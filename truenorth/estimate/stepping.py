@@ -6,8 +6,7 @@ one size. The ratio of the size that fits best, by the filter's own response to 
 chi-square of one degree of freedom where nothing steps. Six moments stand for all, and near the likeliest two more are asked for:
 what the innovations of a drive keep of a step in between is .9 correlated with one of theirs at least, but for the last tenth of a
 log. One of N looks that has the probability p by chance is as rare as a likelihood ratio of ``-2 ln(N p)`` (Markov's inequality):
-that is what is said. Below the limit of a rival, where chance gives it to one of 148 sound logs, a step may have turned heading by
-four sigmas all the same: there it is in sigma by its chance, as a poorer IMU is (:mod:`truenorth.estimate.poorer`).
+that is what is said. Below the limit of a rival nothing is: a look that fits by chance may have any size and effect.
 
 A slow error that was taken from the innovations may be the step itself. So it is looked for without each of them, too; by how much
 the log is against the sensor without that error is taken off the ratio.
@@ -30,12 +29,11 @@ from numpy.typing import NDArray
 from truenorth.analysis.chi_square import tail
 from truenorth.core.errors import DataError
 from truenorth.estimate.responses import likeliest, signatures_of
-from truenorth.estimate.rivals import Rival, last_sizes, likelihood_ratio, moved
+from truenorth.estimate.rivals import Rival, likelihood_ratio, moved
 from truenorth.estimate.warming import LEAST_CHANCE
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Figure
-from truenorth.state.judge import weight
 from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
@@ -88,7 +86,7 @@ def stepping_rivals(
         return []
     ratio, best, run, count = max(found, key=lambda item: item[0])
     as_rare = -2.0 * math.log(min(1.0, count * len(runs) * tail(ratio, 1) + LEAST_CHANCE))
-    if as_rare <= 0.0:
+    if as_rare <= limit("rival"):
         return []
     try:
         effect = moved(first, run(without_step(record, best)))
@@ -96,15 +94,12 @@ def stepping_rivals(
         return []
     # Its size is one of 1/sqrt(ratio) of it, one sigma, and what it does is as unsure.
     effect = effect.times(math.hypot(1.0, 1.0 / math.sqrt(best.ratio)))
-    chance = 1.0 / (1.0 + math.exp(0.5 * (limit("rival") - as_rare)))
-    if as_rare <= limit("rival") and weight(effect.times(math.sqrt(chance)), last_sizes(first)) <= limit("negligible"):
-        return []
     figures: dict[str, Figure] = {
         "axis": "xyz"[best.axis],
         "onset": best.onset * record.duration,
         "size": abs(best.size),
     }
-    return [Rival(as_rare, "rival.gyro_steps", figures, effect, chance)]
+    return [Rival(as_rare, "rival.gyro_steps", figures, effect)]
 
 
 def without_step(record: ImuRecord, step: _Look) -> ImuRecord:
