@@ -97,7 +97,7 @@ def network_bands(
     joint = _covariances(Phi, Q, P)
     errors = np.diagonal(joint, axis1=1, axis2=2)[:, MOTION]
     residual = _variances(H[np.maximum(np.arange(len(joint)) - 1, 0)], joint)
-    return _spread(course, coarse, errors, residual + whole.sigma**2)
+    return _spread(course, coarse, errors, residual + whole.sigma**2, rows)
 
 
 def filter_bands(
@@ -181,7 +181,7 @@ def filter_bands(
             with_log = _variances(seen, joints, differs[DV])
             residual[rows] = _given(residual[rows], with_log, *(column[:, DV] for column in known))
     residual[1:] += whole.sigma**2
-    return _spread(course, coarse, errors, residual)
+    return _spread(course, coarse, errors, residual, many)
 
 
 def _rows_in_steps(there: Array, stride: int, count: int) -> Array:
@@ -221,17 +221,19 @@ def _given(variance: Array, covariance: Array, weight: Array, apart: Array, spre
     return np.maximum(variance - k**2 * spread, 0.0) + ((weight + k) * apart) ** 2
 
 
-def _spread(course: Track, coarse: Track, errors: Array, residual: Array) -> Bands:
-    """Roots of these variances, at all epochs of the course.
+def _spread(course: Track, coarse: Track, errors: Array, residual: Array, rows: Array) -> Bands:
+    """Roots of these variances, at all epochs of the course; `rows` (K,) of the log in each coarse step.
 
-    Where in a step the log's first row comes, and moves the velocity, the step does not say: it has the larger of its ends.
+    Where in a step the first of few rows comes, and moves the velocity, the step does not say: it has the larger of its ends.
     """
     stride = max(1, round(coarse.interval / course.interval))
     after = np.minimum(-(-np.arange(len(course)) // stride), len(coarse) - 1)
     before = np.minimum(np.arange(len(course)) // stride, len(coarse) - 1)
+    few = np.append(rows < stride - 0.5, False)[np.minimum(before, len(rows))][:, None]
 
     def at_all(variance: Array) -> Array:
         sigma: Array = np.sqrt(np.maximum(variance, 0.0))
-        return np.asarray(np.maximum(sigma[before], sigma[after]))
+        between = np.stack([np.interp(course.time, coarse.time, column) for column in sigma.T], axis=1)
+        return np.where(few, np.maximum(sigma[before], sigma[after]), between)
 
     return Bands(at_all(errors), at_all(residual))

@@ -16,7 +16,7 @@ from truenorth.core.errors import AlignmentError, DataError
 from truenorth.estimate.noisier import Answer
 from truenorth.quality.clock_apart import clock_apart
 from truenorth.records import GnssRecord, ImuRecord
-from truenorth.state.evidence import note
+from truenorth.state.evidence import Evidence, note
 
 FAR = 10.0  # s: a delay that no filter finds
 LEFT = 1.5  # s: of whole seconds a delay that is left
@@ -63,7 +63,13 @@ def _shifted(solved: Callable[[GnssRecord | None], Answer], gnss: GnssRecord, la
     found = [item.figures.get("size", 0.0) for item in answer.evidence if item.key in ("delay.late", "delay.early")]
     if answer.status == "inconsistent" or any(float(size) > LEFT for size in found):
         return None
-    key = "clock.ahead" if late > 0.0 else "clock.behind"
-    said = [note(key, "offset", urgent=True, name="GNSS", sensor="gnss", size=abs(late), offset=-late)]
-    said += [note("clock.gps_or_utc")] if abs(abs(late) - GPS_UTC) < 1.0 else []
-    return replace(answer, evidence=(*answer.evidence, *said))  # type: ignore[type-var]  # a dataclass
+    return replace(answer, evidence=(*answer.evidence, *moved_by(-late)))  # type: ignore[type-var]  # a dataclass
+
+
+def moved_by(offset: float) -> list[Evidence]:
+    """What there is to say of a receiver's rows whose times were moved by so many seconds; nothing of none."""
+    if not offset:
+        return []
+    key = "clock.ahead" if offset < 0.0 else "clock.behind"
+    said = [note(key, "offset", urgent=True, name="GNSS", sensor="gnss", size=abs(offset), offset=offset)]
+    return said + ([note("clock.gps_or_utc")] if abs(abs(offset) - GPS_UTC) < 1.0 else [])

@@ -45,7 +45,6 @@ RATE = re.compile(r"rate|gyr|omega|vel|speed|dps|rad_s|deg_s|(?:^|_)w(?:_|[xyz]|
 ANGLE = re.compile(r"rot|ang|theta")
 AT_REST = 2e-3  # by which the specific force at rest in ug differs from gravity, with the sensors' errors
 CONTRADICTED = 1.0  # of the logarithm, by which gyros turn gravity too far in a unit that is not theirs
-PUSHED = 0.03  # of gravity, by which means of a second of the specific force scatter: a base that moves; sensors at rest do not
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
@@ -271,11 +270,7 @@ def _no_gravity(level: float, accel: Array, kind: Kind, interval: float) -> str:
 
 
 def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str, guesses: list[Guess]) -> None:
-    """Ask where documented names, which mean SI, stand over numbers that look like another unit.
-
-    A vehicle that turns about the vertical may by chance turn by a thousand times the earth's rate, as gyros at rest in a unit of
-    few logs do. Where it moves, such a unit is believed only if gravity turns by it.
-    """
+    """Ask where documented names, which mean SI, stand over numbers that look like another unit."""
     unit = "rad/s" if kind == "rates" else "rad"
     force = "m/s^2" if kind == "rates" else "m/s"
     guesses.append(Guess("units", f"{unit}, {force}", "the documented names mean SI"))
@@ -283,10 +278,8 @@ def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str
         return
     if not accel_readings(gravity_level(accel), float(np.median(np.diff(time))), (kind,), (force,)):
         return  # what is no gravity in SI, the checks of plausibility name
-    facts = gyro_facts(time, gyro, accel, kind)
-    readings = gyro_readings(facts, kind, force)
-    chance = not facts.turned and _is_pushed(time, accel)
-    if readings and readings[0].unit != unit and not (chance and not is_usual("gyro", readings[0].unit, kind)):
+    readings = gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force)
+    if readings and readings[0].unit != unit:
         best = readings[0]
         claim = next((r.why for r in readings if r.unit == unit), f"in {unit} they cannot be a gyro's")
         options = [{"units": {"gyro": best.unit, "accel": force}}, {"units": {"gyro": unit, "accel": force}}]
@@ -294,14 +287,6 @@ def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str
             f"{source}: the gyros' columns have the documented names, which mean {unit}, but look like {best.unit}: {best.why}; "
             f"{claim}", options, guesses,
         )  # fmt: skip
-
-
-def _is_pushed(time: Array, accel: Array) -> bool:
-    """Whether the specific force, in any unit, changes as on no base at rest; its slow part, which no engine shakes."""
-    rows = max(1, round(1.0 / float(np.median(np.diff(time)))))
-    cells = len(accel) // rows
-    means = accel[: cells * rows].reshape(cells, rows, 3).mean(axis=1)
-    return cells > 1 and float(np.linalg.norm(means.std(axis=0))) > PUSHED * gravity_level(accel)
 
 
 # -------------------------------------------------------------------------------------------------- axes

@@ -30,6 +30,7 @@ from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.free_memory import give_back
 from truenorth.core.position import Position
 from truenorth.estimate.gaps import LONGEST_BRIDGE
+from truenorth.estimate.own_clock import moved_by
 from truenorth.live.answer import Answer, under_way
 from truenorth.live.feed import Feed
 from truenorth.live.feeds import GnssFeed
@@ -45,7 +46,6 @@ from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.state.evidence import Evidence
 from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ GROWTH = 1.1  # times the length of the last solution, from which the next is du
 SHARE = 0.1  # of one core, for solutions
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
-    "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "failure", "solutions", "clocks", "_due",
+    "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "failure", "solutions", "_due",
 )  # fmt: skip
 APART = ("clock.ahead", "clock.behind", "clock.gps_or_utc")  # evidence that rows were moved by whole seconds
 NOWHERE = "no place is given, and no fix has come"
@@ -116,7 +116,6 @@ class Aligner:
         self.onward = Onward(kind)
         self.failure = ""
         self.solutions = 0
-        self.clocks: tuple[Evidence, ...] = ()  # by how much the clocks of feeds were apart, whose rows are moved since
         self._solving, self._newest_in = Solving(share, background), np.inf  # s: last row of the solution that runs
         self._due = self._then_due = -np.inf  # s: of the next solution, and of the one after the one that runs
         self._lock = threading.Lock()
@@ -353,13 +352,14 @@ class Aligner:
         give_back()  # the rows that came meanwhile, and what the solution before held
 
     def _take_over(self, found: Alignment) -> Alignment:
-        """Go on from a solution, and give it back with all that was found of clocks: rows that come are moved as its rows were."""
-        said = [item for item in found.evidence if item.key in APART]
-        for item in said:
-            if "offset" in item.figures:
+        """Go on from a solution, and give it back with how far rows are moved in all: those that come are moved as its were."""
+        said = [item for item in found.evidence if item.key not in APART]
+        for item in found.evidence:
+            if item.key in APART and "offset" in item.figures:
                 self.feeds[str(item.figures["sensor"])].shift(float(item.figures["offset"]))
-        before, self.clocks = self.clocks, (*self.clocks, *said)
-        found = replace(found, evidence=(*found.evidence, *before)) if before else found
+        gnss = self.feeds.get("gnss")
+        said += [] if gnss is None else moved_by(gnss.offset)
+        found = replace(found, evidence=tuple(said))
         self._go_on(found)
         return found
 

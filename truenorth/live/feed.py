@@ -41,13 +41,13 @@ class Feed(ABC):
     columns: ClassVar[tuple[str, ...]]
     says: ClassVar[tuple[str, ...]] = ()  # attributes that say what the columns mean
     navigates: ClassVar[bool] = True  # whether it aids navigation, too
+    offset: float = 0.0  # s, added to the time of each row: by so much its clock is behind the IMU's
 
     def __init__(self, mounting: Mounting | None = None) -> None:
         self.mounting = mounting
         self.reading: dict[str, Any] = {}  # options of the reader of such logs
         self.left_out = 0  # rows without a finite time, without any number, that cannot be, repeated, of another clock
         self.failure = ""  # of the last rows that could not be read
-        self.offset = 0.0  # s, added to the time of each row: by so much its clock is behind the IMU's
         self.clear()
 
     def clear(self) -> None:
@@ -82,7 +82,9 @@ class Feed(ABC):
         """(N, 1 + columns) all rows so far."""
         waiting, self._waiting = self._waiting, []  # another thread may add
         if waiting:
-            rows = np.vstack([self._rows, *waiting])
+            new = np.vstack(waiting)
+            new[:, 0] += self.offset  # here, not where they come: another thread may bring one while the clock is found
+            rows = np.vstack([self._rows, new])
             _, first = np.unique(rows[:, 0], return_index=True)
             self._rows = rows[first]
             if len(self._rows) >= FEW:
@@ -103,8 +105,6 @@ class Feed(ABC):
 
     def add(self, rows: Array) -> None:
         """Take rows ``time, columns`` in, any order; those that cannot be are counted and left out."""
-        if self.offset:
-            rows = np.column_stack([rows[:, 0] + self.offset, rows[:, 1:]])
         finite = np.where(np.isfinite(rows), rows, np.nan)
         with np.errstate(invalid="ignore"):
             sound = np.isfinite(rows[:, 0]) & np.isfinite(rows[:, 1:]).any(axis=1)
