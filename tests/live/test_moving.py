@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
 from truenorth.estimate.own_clock import moved_by
 from truenorth.live import Aligner, GnssFeed, Navigator, OdometerFeed
+from truenorth.live.feed import shift_as
 from truenorth.navigation.given import mountings_found
 from truenorth.navigation.start import start_of
 from truenorth.simulation.scenario import read_scenario
@@ -337,3 +339,6 @@ def test_rows_are_moved_however_they_come_and_a_clock_taken_back_is_not_spoken_o
     assert keys == [["clock.behind", "clock.gps_or_utc"], ["clock.ahead"], []]
     feed.shift(-18.0)
     assert (feed.offset, feed.rows[0, 0]) == (0.0, 1.0)
+    for feeds in ({"gnss": feed}, {}):  # a run that goes on from a saved answer has rows as they were stamped
+        shift_as(SimpleNamespace(evidence=moved_by(-60.0)), feeds)
+    assert feed.offset == -60.0

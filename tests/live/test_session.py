@@ -155,8 +155,10 @@ class ByHand:
 
     def wait_for(self, happened):
         """Until this holds of what was last published."""
+        until = time.monotonic() + 120.0
         while not happened(*self.now):
             assert self.thread.is_alive()
+            assert time.monotonic() < until, self.now
             time.sleep(0.02)
 
     def drive(self, happened):
@@ -213,9 +215,10 @@ def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
 @pytest.mark.slow
 def test_navigation_that_begins_with_the_last_row_leaves_the_alignment(logs):
     """Rows end, heading is good, and an interrupt or the end of the stream comes without another row."""
-    with ByHand(logs, navigate=True) as run:
+    with ByHand(logs) as run:  # a drive that is noticed before a solution knows of it would begin navigation by itself
         sent = run.drive(heading_known)
         run.wait_for(lambda aligner, *_: aligner.intake.counts.taken == sent)
+        run.session.navigate = True
         run.session.go.set()
         run.wait_for(navigates)
         _, answer, note = run.now

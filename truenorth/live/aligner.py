@@ -32,7 +32,7 @@ from truenorth.core.position import Position
 from truenorth.estimate.gaps import LONGEST_BRIDGE
 from truenorth.estimate.own_clock import moved_by
 from truenorth.live.answer import Answer, under_way
-from truenorth.live.feed import Feed
+from truenorth.live.feed import APART, Feed, shift_as
 from truenorth.live.feeds import GnssFeed
 from truenorth.live.felt import Felt, without_known
 from truenorth.live.intake import LATE, Intake, as_rows
@@ -57,7 +57,6 @@ SHARE = 0.1  # of one core, for solutions
 KEPT = (
     "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "failure", "solutions", "_due",
 )  # fmt: skip
-APART = ("clock.ahead", "clock.behind", "clock.gps_or_utc")  # evidence that rows were moved by whole seconds
 NOWHERE = "no place is given, and no fix has come"
 
 
@@ -354,9 +353,7 @@ class Aligner:
     def _take_over(self, found: Alignment) -> Alignment:
         """Go on from a solution, and give it back with how far rows are moved in all: those that come are moved as its were."""
         said = [item for item in found.evidence if item.key not in APART]
-        for item in found.evidence:
-            if item.key in APART and "offset" in item.figures:
-                self.feeds[str(item.figures["sensor"])].shift(float(item.figures["offset"]))
+        shift_as(found, self.feeds)
         gnss = self.feeds.get("gnss")
         said += [] if gnss is None else moved_by(gnss.offset)
         found = replace(found, evidence=tuple(said))

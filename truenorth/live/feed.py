@@ -7,6 +7,7 @@ at a time, as measurements for the closed loop.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -26,6 +27,7 @@ LARGEST = 1e8  # SI units: beyond what any of these sensors measures
 FEW, OTHER_CLOCK = 5, 86400.0  # rows from which on, and s from their median beyond which, a row is of another clock
 MOVES = 1.0  # m/s: faster than an antenna on a swaying mast
 LASTING = 3  # rows in a line
+APART = ("clock.ahead", "clock.behind", "clock.gps_or_utc")  # evidence that rows were moved by whole seconds
 
 
 class Feed(ABC):
@@ -196,6 +198,13 @@ class Feed(ABC):
                 sent[source.name] = float(source.time[new].max())
                 found.append(replace(source, **_rows_of(source, new)))
         return found
+
+
+def shift_as(found: Any, feeds: Mapping[str, Feed]) -> None:
+    """Move the rows of those feeds whose clock an answer, with its `evidence`, has found to be apart, as its own were moved."""
+    for item in found.evidence:
+        if item.key in APART and item.figures.get("sensor") in feeds:
+            feeds[str(item.figures["sensor"])].shift(float(item.figures["offset"]))
 
 
 def _rows_of(source: Aiding, rows: NDArray[np.intp]) -> dict[str, Any]:

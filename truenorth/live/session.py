@@ -24,7 +24,7 @@ from truenorth.formats.layout import Layout
 from truenorth.live.aid_sources import AidSource, Replayed, open_aid
 from truenorth.live.aligner import SHARE, Aligner
 from truenorth.live.answer import Answer
-from truenorth.live.feed import Feed
+from truenorth.live.feed import Feed, shift_as
 from truenorth.live.journal import Journal
 from truenorth.live.log import Kind
 from truenorth.live.navigator import Navigator
@@ -147,6 +147,7 @@ class Session:
         # A run that was killed while it wrote its start has left the folder alone.
         if earlier and start is not None and (start / ARCHIVE).exists():
             begin = load(start)
+            shift_as(begin, {feed.key: feed for feed in self.feeds})  # the journal keeps rows as they were stamped
             run = Navigator(begin, feeds=self.feeds, mountings=as_found(begin), kind=kind)
         else:
             aid = [*self.feeds, *([] if self.turner is None else [self.turner])]

@@ -268,10 +268,9 @@ def _by_specification(
 def _about_its_heading(plan: Plan, given: Mapping[str, Aid]) -> Plan:
     """The plan from the heading that the log shows, where its start was unsure (:mod:`truenorth.navigation.recentred`)."""
     free = {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()}
-    aiding = plan.sources(mounted_as(given, free))
-    if not aiding:
-        return plan
-    return replace(plan, start=recentred(lambda s: replace(plan, start=s).run(aiding, smooth=True), plan.start))
+    aiding = {True: plan.sources(given), False: plan.sources(mounted_as(given, free))}
+    run = lambda at, gated: replace(plan, start=at).run(aiding[gated], smooth=not gated)  # noqa: E731
+    return replace(plan, start=recentred(run, plan.start)) if aiding[True] else plan
 
 
 def _damped(

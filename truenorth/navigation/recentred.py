@@ -5,7 +5,8 @@ columns that turn as its heading does, and that passes for knowledge of both: of
 RMS, and heading 7 on the way. So the log is filtered and smoothed, its start is turned to where the smoother puts it, until that
 stays: Gauss and Newton's way to the most likely heading. Then it begins with three times the sigma that the log leaves of it. The
 log counts twice in that: sigma of heading is 5 % too small at the most, less than figures of sigma are worth. Where the log shows
-less than that of a start, or is likelier as it began, the start stays as it was said to be.
+less than that of a start, or is likelier as it began, the start stays as it was said to be. These passes have no gates, which a
+wrong heading would shut: a fix that jumps pulls them. So the log with its gates has to be likelier from there, too.
 
 Source: B. Bell, "The iterated Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4 (1994); the narrow start is ours,
 as in passes on the move (:mod:`truenorth.alignment.in_motion_passes`).
@@ -31,13 +32,13 @@ MOST = 3  # passes
 WIDER = 3.0  # times what the log leaves of a heading
 
 
-def recentred(run: Callable[[Start], Track], start: Start) -> Start:
+def recentred(run: Callable[[Start, bool], Track], start: Start) -> Start:
     """The start with the heading that the log shows, where it was unsure and is shown; else the same one.
 
     Parameters
     ----------
     run : callable
-        The log from a start, without gates, to be smoothed once that is asked for.
+        The log from a start, with gates or, to be smoothed once that is asked for, without.
     start : Start
     """
     before = math.sqrt(float(start.P[UP, UP]))
@@ -46,7 +47,7 @@ def recentred(run: Callable[[Start], Track], start: Start) -> Start:
     best, at, shown = math.inf, start, start
     for _ in range(MOST):
         try:
-            track = run(at)
+            track = run(at, False)
             cost = bounded_misfit(track.residuals)
             if not cost < best:
                 break
@@ -61,7 +62,13 @@ def recentred(run: Callable[[Start], Track], start: Start) -> Start:
         if abs(turn) < SETTLED * sigma:
             break
         at = replace(at, C_nb=np.asarray(dcm_from_euler(-turn, 0.0, 0.0) @ at.C_nb))
-    return start if shown.C_nb is start.C_nb else shown
+    if shown.C_nb is start.C_nb:
+        return start
+    try:
+        likelier = bounded_misfit(run(shown, True).residuals) < bounded_misfit(run(start, True).residuals)
+    except DataError:
+        return start
+    return shown if likelier else start
 
 
 def _narrower(start: Start, part: float) -> Start:
