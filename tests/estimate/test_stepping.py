@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.alignment.test_suspect import track
+from tests.estimate import linear_filter
 from tests.runs import few_and_all
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.campaign.faults import _Draw
@@ -18,23 +18,11 @@ from truenorth.state.limits import limit
 ROWS, SIGMA = 200, 1e-5  # rad/s, of what this filter measures of rates in a second
 SPEC = imu_spec("tactical")
 STILL = ImuRecord(np.arange(1.0, ROWS + 1.0), np.zeros((ROWS, 3)), np.zeros((ROWS, 3)), "rates", "still")
-TRACK = track(1.0, level=0.0)
-C_NB = TRACK.C_nb.copy()
 
 
 def filter_of(rng):
-    """A linear filter with noise of its own, the same in each pass: its innovations are rates less their mean."""
-    noise = rng.standard_normal((ROWS, 3))
-
-    def run(record):
-        rate = record.gyro - record.gyro.mean(axis=0)
-        z = noise + rate / SIGMA
-        source = replace(TRACK.residuals[0], innovation=z, nis=np.sum(z**2, axis=1))
-        C_nb = C_NB.copy()
-        C_nb[:, 0, 1] = 100.0 * rate[-1].sum()  # a heading of the last rate
-        return replace(TRACK, residuals=(source,), C_nb=C_nb)
-
-    return run
+    """Its innovations are rates, its heading that of the last one."""
+    return linear_filter.filter_of(rng, ROWS, SIGMA, lambda record: record.gyro, lambda rate: 100.0 * rate[-1].sum())
 
 
 @pytest.mark.slow

@@ -1,12 +1,11 @@
 """Accelerometers that warm up together are seen by the filter's own response, and by chance no more often than is said."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.alignment.test_suspect import track
+from tests.estimate import linear_filter
 from tests.runs import few_and_all
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.campaign.faults import _Draw
@@ -21,22 +20,11 @@ BIAS = math.sqrt(SPEC.bias_variance[3])
 STILL = ImuRecord(
     np.arange(1.0, ROWS + 1.0), np.zeros((ROWS, 3)), np.tile([0.0, 0.0, 9.8], (ROWS, 1)), "rates", "still"
 )
-TRACK = track(1.0, level=0.0)
 
 
 def filter_of(rng):
-    """A linear filter with noise of its own, the same in each pass: its innovations are forces less their mean."""
-    noise = rng.standard_normal((ROWS, 3))
-
-    def run(record):
-        force = record.accel - record.accel.mean(axis=0)
-        z = noise + force / SIGMA
-        source = replace(TRACK.residuals[0], innovation=z, nis=np.sum(z**2, axis=1))
-        C_nb = TRACK.C_nb.copy()
-        C_nb[:, 0, 1] = force[-1, 0]  # a heading of the last force
-        return replace(TRACK, residuals=(source,), C_nb=C_nb)
-
-    return run
+    """Its innovations are forces, its heading that of the last one."""
+    return linear_filter.filter_of(rng, ROWS, SIGMA, lambda record: record.accel, lambda force: force[-1, 0])
 
 
 @pytest.mark.slow
