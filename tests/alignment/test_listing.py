@@ -8,7 +8,7 @@ import pytest
 from benchmarks.honesty.foreign import attitude, exp
 from tests.runs import few_and_all, some
 from truenorth import align
-from truenorth.alignment.listing import lists
+from truenorth.alignment.listing import LISTS, lists
 from truenorth.alignment.task import make_task
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE, gravity_of_place
@@ -79,6 +79,7 @@ def test_a_base_that_lists_is_aligned(run, grade):
     good = {"navigation": "aligned", "tactical": "level_only"}[grade]
     assert answer.status == (good if found(run, grade=grade, tilt=DEGREE) else "inconsistent")
     if answer.status == good:
+        assert answer.method_reason == LISTS
         off = rotation_vector_from_dcm(answer.C_nb @ C.T)
         sigma = np.array([answer.euler_sigma[1:].max()] * 2 + [answer.euler_sigma[0]])
         assert np.all(np.abs(off) < 4.0 * sigma)

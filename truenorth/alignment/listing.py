@@ -30,6 +30,7 @@ from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
+LISTS = "the base lists: it tilts steadily, as its gyros bear out; its own motion is fitted to the log"
 CONTRADICTS, BEARS_OUT = 5.0, 3.0  # sigmas of the mean rate and the gyros' bias
 FIVE_TIMES = 0.2  # without a specification: of what the earth's rate misses by, what may be left of it with the tilt
 

@@ -29,7 +29,7 @@ from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
-from truenorth.alignment.listing import as_listing
+from truenorth.alignment.listing import LISTS, as_listing
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.rate_step import rate_step_evidence
@@ -158,8 +158,9 @@ def align_base(
     task = make_task(record, position, at)
     if np.linalg.norm(task.means.f_b) < NO_FORCE:
         raise no_attitude(record.source)
-    task = task if method in STILL else as_listing(task, spec)
+    seen, task = task, task if method in STILL else as_listing(task, spec)
     chosen, why = _choose(method, task)
+    why = LISTS if method == "auto" and task is not seen else why
     tell(f"aligning: {chosen}")
     means = check_means(task.means, position.lat, task.gravity)
     if is_blind(task.motion, means) or is_lost(task, means, spec, heading_limit):

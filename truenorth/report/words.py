@@ -28,6 +28,7 @@ WHY = (
     "the base is still: the filter weighs sensor noise and bias as it should, from the first second on",
     "the base is disturbed: mean rates would be off, the inertial frame is not",
     "the base sways: mean rates mean nothing, the inertial frame follows every motion",
+    "the base lists: it tilts steadily, as its gyros bear out",
     "the base is {0}: only the inertial frame follows it",
     "the base is {0}: only the inertial frame follows it (where a turntable does it, the aid `Positions()` shows more)",
     "its own motion is fitted to the log",
