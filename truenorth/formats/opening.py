@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 from truenorth.formats.columns import Columns, columns_of_arrays
@@ -41,7 +42,10 @@ def columns_of(path: Path, format: str, named: bool = True, part: str = "imu") -
             if labelled
             else "the dialect in which most lines are rows of numbers"
         )
-        return Columns(path, table.names, table.read, table.column, table.place, table.named, notes, why, table.above)
+        column = lru_cache(maxsize=2)(
+            table.column
+        )  # a clock is asked for more than once, and each time is a pass over the text
+        return Columns(path, table.names, table.read, column, table.place, table.named, notes, why, table.above)
     if format == "sensor-folder":
         from truenorth.formats import sensor_folder
 
