@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.paths import as_path, unreadable
 from truenorth.formats import devices
+from truenorth.formats.clock_file import with_clock_file
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import options_for, without_imu
@@ -26,6 +27,7 @@ from truenorth.formats.order import ordered
 from truenorth.formats.phone import new_fixes
 from truenorth.formats.positions import columns_of_positions
 from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, find
+from truenorth.formats.zipped import of_folder
 from truenorth.records import EncoderRecord, HeightRecord, OdometerRecord, VelocityRecord
 
 Array = NDArray[np.float64]
@@ -42,7 +44,7 @@ ODOMETER = (
     Quantity("distance", "length", "m", ("increment",)),
     Quantity("distance_unsigned", "length", "m"),
     Quantity("distance_total", "length", "m", ("mileage", "odometer")),
-    Quantity("speed", "speed", "m/s", ("velocity", "v", "wheel_speed")),
+    Quantity("speed", "speed", "m/s", ("velocity", "v", "wheel_speed", "odo (m/s)")),
     Quantity("speed_unsigned", "speed", "m/s"),
     Quantity("pulse_size", "length", "m"),
 )
@@ -119,7 +121,10 @@ def read_odometer(
         Bad data: with file, line (or row) and column.
     """
     found, others = open_log(
-        path, format, ODOMETER, {"columns": columns, "units": units, "pulse_size": pulse_size, "signed": signed}
+        of_folder(as_path(path, "log"), "odometer"),
+        format,
+        ODOMETER,
+        {"columns": columns, "units": units, "pulse_size": pulse_size, "signed": signed},
     )
     asked = [name for name in COUNTS if {name, f"{name}_unsigned"} & found.asked]
     present = [name for name in COUNTS if found.has(name) or found.has(f"{name}_unsigned")]
@@ -278,7 +283,7 @@ def open_log(
             columns = devices.columns(path, chosen, part or "gnss", values.get("topic"))
         else:
             own = columns_of_positions(path) if part == "gnss" and chosen == "csv" else None
-            columns = own or columns_of(path, chosen, bool(options.columns), part)
+            columns = own or with_clock_file(columns_of(path, chosen, bool(options.columns), part))
         if not columns.named:
             example = ",".join(q.name for q in quantities[:4])
             raise DataError(

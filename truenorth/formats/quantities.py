@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 LONG_STEP = 100.0  # s: sensors that aid seldom wait so long
 FASTEST = 1000.0  # m/s, of what carries a receiver
+SENSOR = re.compile(r"(?:gps|gnss)[_ ](?!time)", re.IGNORECASE)  # in front of all headings of a receiver: ``gps_lat``
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class Quantity:
     opposite: tuple[str, ...] = ()  # names of the same quantity counted the other way, such as ``VD`` of ``VU``
     group: str = ""  # by which `units` may name it along with others, such as ``velocity``
 
+
+Meaning = tuple[Quantity, float, str | None]  # a quantity, its sign, and the unit that the heading names
 
 TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc", "time_since_start_in"))
 
@@ -151,10 +154,10 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
     claims: dict[str, list[tuple[str, float]]] = {}
     stated: set[str] = set()
     named = {ours: text if text in columns.names else text.removeprefix("-") for ours, text in options.columns.items()}
-    for name in columns.names:
+    for name, meanings in _understood(columns.names, quantities).items():
         if name in named.values():
             continue
-        for quantity, sign, unit in _meanings(name, quantities):
+        for quantity, sign, unit in meanings:
             if quantity.name not in options.columns:
                 stated |= {quantity.name} if _unit(quantity, unit, options) else set()
                 claims.setdefault(quantity.name, []).append(
@@ -230,12 +233,22 @@ def _of_epoch(time: Array, factor: float) -> float:
     return factor
 
 
-def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[tuple[Quantity, float, str | None]]:
+def _understood(names: Iterable[str], quantities: Sequence[Quantity]) -> dict[str, list[Meaning]]:
+    """What each heading may mean; where none but the clock's means anything, without the sensor's name in front of each."""
+    found = {name: list(_meanings(name, quantities)) for name in names}
+    if any(quantity.name != "time" for meanings in found.values() for quantity, _, _ in meanings):
+        return found
+    return {name: list(_meanings(SENSOR.sub("", name), quantities)) or found[name] for name in found}
+
+
+def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[Meaning]:
     """What a header cell may mean: a quantity, its sign, and the unit it names."""
     plain, unit = split(name)
     words = _key(plain)
     ends = [(words, unit)]
-    if unit is None:
+    if unit is not None:
+        ends += [(_key(name), unit)]  # a name that means this in this unit alone, such as ``odo (m/s)``
+    else:
         ends += [(words[: m.start()], unit_in(words[m.end() :])) for m in re.finditer("_", words)]
     for base, stated in ends:
         if base != words and stated is None:

@@ -37,6 +37,7 @@ WITHOUT_GRAVITY = re.compile(r"(?:lin(?:ear)?|user)_?acc(?:el(?:eration|erometer
 GRAVITY = re.compile(r"gravity(?:_?\d+)?")
 CLOCK = re.compile(r"time(?:_?stamps?)?")
 GNSS = re.compile(r"(?:location|gps|gnss)(?:_?(?:gps|gnss|fused|data|location))?(?:_?\d+)?")
+ODOMETER = re.compile(r"(?:odo(?:meter)?|wheel_?speed)(?:_?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Sensor:
 
 
 def files_of(folder: Path) -> dict[str, list[Path]]:
-    """Files by what their names say: ``gyro``, ``accel``, ``gravity``, ``linear`` (without gravity), ``clock`` and ``gnss``."""
+    """Files by what their names say: ``gyro accel gravity linear`` (without gravity), ``clock gnss odometer``."""
     found: dict[str, list[Path]] = {}
     patterns = {
         "gyro": GYRO,
@@ -59,6 +60,7 @@ def files_of(folder: Path) -> dict[str, list[Path]]:
         "gravity": GRAVITY,
         "clock": CLOCK,
         "gnss": GNSS,
+        "odometer": ODOMETER,
     }
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() not in SUFFIXES or not path.is_file():
