@@ -67,6 +67,33 @@ def test_a_delay_that_a_short_log_holds_where_it_was_said(run):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("seconds", "rate", "grade"), [(60.0, 2.0, "tactical"), (120.0, 1.0, "navigation")])
+@pytest.mark.parametrize("late", [0.3, -0.3])
+def test_a_delay_by_attitude_alone_is_named(seconds, rate, grade, late):
+    """Known to 5 ms, and .3 s wrong: the noise that was fitted held it, and the delay was 56 of its sigmas off, aligned."""
+    known = {"lever_arm_sigma": 0.3, "matching": "attitude", "delay_sigma": 0.005}
+    wrong = align_transfer(*_logs(0, seconds, grade, rate=rate, late=late), grade, **known)
+    assert wrong.status == "inconsistent"
+    (named,) = [item for item in wrong.evidence if item.key == "transfer.delay"]
+    assert named.figures["miss"] == pytest.approx(0.3, abs=0.05)
+    assert "rival.master_heading" not in _keys(wrong)
+    sound = align_transfer(*_logs(0, seconds, grade, rate=rate), grade, **known)
+    assert sound.status == "aligned"
+    assert abs(sound.transfer.delay) < 4.0 * sound.transfer.delay_sigma
+
+
+@pytest.mark.slow
+def test_a_heading_that_drifts_is_no_delay_by_attitude_alone():
+    """3 arcmin a minute are no delay."""
+    slave, master = _logs(0, 200.0, "navigation")
+    turned = np.zeros((len(master), 3))
+    turned[:, 2] = 3.0 * ARCMIN / 60.0 * (master.time - master.time[0])
+    drifting = replace(master, C_nb=dcm_from_rotation_vector(turned) @ master.C_nb)
+    found = align_transfer(slave, drifting, "navigation", matching="attitude", delay_sigma=0.005)
+    assert "transfer.delay" not in _keys(found)
+
+
+@pytest.mark.slow
 def test_what_is_added_is_in_what_navigation_begins_with():
     """Attitude and velocity of the covariance that goes on are as unsure as the answer."""
     answer = align_transfer(*_logs(0, 60.0, "tactical"), "tactical", lever_arm_sigma=0.3)

@@ -16,6 +16,7 @@ from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.sway_noise import sway_noise_evidence
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.alignment.swing import swing_note
+from truenorth.alignment.warming_up import warming_evidence
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
@@ -46,6 +47,7 @@ def what_begins(
     seen = innovations_of(fine, others)
     banks = drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
     drift, bias, gravity = matched(seen, *banks)
+    rival = float(max(drift.ratio.max(), bias.ratio.max()))
     if sways:
         drift, bias = weighed_by_colour(seen, banks[:2], (drift, bias))
     steps = bias_step_evidence(fine, spec, bias)
@@ -54,6 +56,7 @@ def what_begins(
     if isinstance(fine, SwayAlignment):
         elsewhere = fine.misfit_at
         steps += [*fine.begun, *([] if fine.slow_arm is None else [swing_note(fine.motion)])]
+        steps += warming_evidence(fine, seen, rival) if sways else []
         steps += (
             [*sway_noise_evidence(fine.noisier, spec, position.lat), *loud_rows_evidence(fine, spec)] if given else []
         )

@@ -310,8 +310,9 @@ def _rivals(
     def shifted(record: ImuRecord) -> Track:
         return of_translation(run(record, model=model, start=wide))
 
-    first, free = of_translation(track), shifted(part)
-    found += delay_evidence(first, free, said)
+    loose = run(part, model=model, start=wide)
+    found += delay_evidence(track, loose, said, found)
+    first, free = of_translation(track), of_translation(loose)
     # What a delay that is less known explains is no delay of the gyros.
     first = free if likelihood_ratio(first.residuals, free.residuals) > 0.0 else first
     return found + gyro_delay_evidence(shifted, first, part)

@@ -13,12 +13,12 @@ such rivals are compared with this one (:mod:`truenorth.estimate.rivals`), and t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from truenorth.alignment.transfer_filter import Assumed
+from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed
 from truenorth.core.errors import DataError
 from truenorth.errors.master import ATTITUDE_ERROR, DELAY, MasterErrors, TransferModel
 from truenorth.estimate.rivals import Rival, effect_of, likelihood_ratio
@@ -73,20 +73,33 @@ def _drifted(track: Track) -> float:
     return float(np.ptp(track.sensors[len(track) // 10 :, at][:, 2]))
 
 
-def delay_evidence(first: Track, free: Track, said: Assumed) -> list[Evidence]:
+def delay_evidence(first: Track, free: Track, said: Assumed, others: Sequence[Evidence]) -> list[Evidence]:
     """That the delay of the master's stamps is not what was said: a delay that is hardly known fits better, far away from that.
 
     A delay that is said to be known to milliseconds is held there by a log of a minute or of a few rows, and what it does to the
-    innovations is within their noise row by row. Their likelihood shows it.
+    innovations is within their noise row by row. Their likelihood shows it. Where a translation is matched, it speaks: attitudes do
+    not part late gyros from an early master. Where attitude is matched alone, a late master turns late, and its noise, which is
+    read from the innovations, holds that. A heading that drifts seems to explain a part of it, and is the better cause if it is
+    likelier.
 
     Parameters
     ----------
     first, free : Track
         With the delay as well known as was said, and hardly known.
     said : Assumed
+    others : sequence of Evidence
+        What else would explain the log.
     """
     at = free.layout.slice_of(DELAY)
-    if at is None or likelihood_ratio(first.residuals, free.residuals) <= limit("rival"):
+    if at is None:
+        return []
+    by_translation = [tuple(r for r in track.residuals if r.name in TRANSLATIONS) for track in (first, free)]
+    alone = not by_translation[0]
+    shown = (first.residuals, free.residuals) if alone else by_translation
+    if likelihood_ratio(*shown) <= limit("rival"):
+        return []
+    drifts = [float(item.figures["ratio"]) for item in others if alone and item.key == "rival.master_heading"]
+    if drifts and max(drifts) > likelihood_ratio(*shown, whitened=True):  # as drifts are weighed
         return []
     miss = abs(float(free.sensors[-1, at][0]))
     if miss <= limit("mounting") * said.delay_sigma:

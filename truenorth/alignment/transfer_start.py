@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_delay import (
     WINDOW,
+    Found,
     agreement,
     delay_by_arm,
     find_delay,
@@ -60,7 +61,7 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     by_arm = delay_by_arm(slave, master, assumed.lever_arm, assumed.lever_arm_sigma)
     sigma = math.hypot(assumed.delay_sigma, by_arm)
     slack = limit("other delay") * max(sigma, 0.5 * master.interval)
-    if found.sure and not apart and miss > AGAIN and _fits(slave, master, assumed, found.correlation):
+    if found.sure and not apart and miss > AGAIN and _again(slave, master, assumed, found):
         return assumed, ()
     if found.sure and (apart or miss > slack):
         if not apart and runs_backwards(slave, master, assumed.C_mb, assumed.delay, slack):
@@ -83,12 +84,16 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     return assumed, ()
 
 
-def _fits(slave: ImuRecord, master: MasterRecord, assumed: Assumed, best: float) -> bool:
-    """Whether a log agrees at the delay that was said about as well as it does anywhere (`best`, a correlation).
+def _again(slave: ImuRecord, master: MasterRecord, assumed: Assumed, found: Found) -> bool:
+    """Whether the motion that agrees at a delay far from the one that was said comes again, and the log belongs where it was said.
 
-    Manoeuvres that come again agree as well with the next ones, and stamps that scatter make it a matter of chance where best.
+    Manoeuvres that come again agree as well with the next ones, and rows of a second or stamps that scatter make it a matter of
+    chance where best. So a log belongs where it was said if it agrees there about as well; or if the delay at which agreement and
+    what both logs have in common are the likeliest is near that. By how much the delay is off then, the filter asks.
     """
-    return _left(slave, master, assumed.C_mb, assumed.delay) < MISFIT * (1.0 - best**2)
+    if _left(slave, master, assumed.C_mb, assumed.delay) < MISFIT * (1.0 - found.correlation**2):
+        return True
+    return abs(likeliest_delay(slave, master, assumed.C_mb) - assumed.delay) < AGAIN
 
 
 def _unbroken(master: MasterRecord) -> MasterRecord:
