@@ -231,9 +231,10 @@ def _aligned(
         _, begun = hand_over(slave, master, own, other, said, noise, position=position)
         return run(part, model=own, start=begun)
 
-    def of_another_master(errors: MasterErrors) -> Track:
-        """The same of a master with such errors, which are estimated."""
-        own = replace(_model(spec, said, what, flexure, errors, model.axes), considered=False)
+    def of_another_master(drift: float) -> Track:
+        """The same of a master whose heading drifts by so much, rad; its errors are estimated."""
+        of = replace(errors, heading_drift=drift)
+        own = replace(_model(spec, said, what, flexure, of, model.axes), considered=False)
         _, begun = hand_over(slave, master, own, spec, said, noise, position=position)
         return run(part, model=own, start=begun, nominal=found.nominal.with_states(own.states))
 
@@ -277,7 +278,7 @@ def _rivals(
     spec: ImuSpec,
     said: Assumed,
     of_another_imu: Callable[[ImuSpec], Track],
-    of_another_master: Callable[[MasterErrors], Track],
+    of_another_master: Callable[[float], Track],
 ) -> list[Evidence]:
     """What else would explain the log; `run` with a slave, a model and a start, or the same of another IMU.
 
