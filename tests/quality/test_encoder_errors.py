@@ -65,7 +65,9 @@ def test_noise_of_an_axis_that_rests_is_no_disc(runs):
         angles = np.column_stack([turns.angles[:, 0], turns.angles[0, 1] + noise])
         C = C_bs_from_angles("zx", angles)
         off = C[:, :, 0] * noise[:, None]
-        turns = replace(turns, turn=turns.turn - off, angles=angles, C_bs=C, directions=(turns.directions[0], C[:, :, 0]))
+        turns = replace(
+            turns, turn=turns.turn - off, angles=angles, C_bs=C, directions=(turns.directions[0], C[:, :, 0])
+        )
         assert not {"2.1", "2.2"} & errors_of(turns).keys()
 
 
