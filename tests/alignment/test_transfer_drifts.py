@@ -101,3 +101,12 @@ def test_what_is_added_is_in_what_navigation_begins_with():
     before, after = answer.transfer.P, grown(answer, added).transfer.P
     np.testing.assert_allclose(np.diag(after - before)[PHI], np.square([1e-3, 1e-3, 2e-3]))
     assert np.sqrt(np.diag(after)[DV].max()) == pytest.approx(math.hypot(np.sqrt(np.diag(before)[DV].max()), 0.2))
+
+
+@pytest.mark.parametrize("matching", ["position", "position+attitude"])
+def test_places_of_a_master_whose_velocity_errs_name_no_heading(matching):
+    """A drift of heading acts on no place, and as a rival has the master's other errors too: without one of them it broke down."""
+    known = {"lever_arm_sigma": 0.3, "matching": matching, "master_errors": "navigation"}
+    answer = align_transfer(*_logs(0, 200.0, "navigation"), "navigation", **known)
+    assert answer.status == "aligned"
+    assert "rival.master_heading" not in _keys(answer)

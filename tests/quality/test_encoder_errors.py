@@ -1,5 +1,7 @@
 """Zero, discs and slips of an indexer's encoder, by how the base turns: exact in what is made, and none in pure sway; both ways."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,22 @@ def test_sway_is_no_error(runs):
         turns = made(rng, axes=1 + run % 2, size=np.radians(0.003 * 1000.0 ** rng.random()))
         assert [item for item in error_evidence(turns) if item.kind != "hint"] == []
         assert slip_of(turns) is None
+
+
+@few_and_all(30, few=3)
+def test_noise_of_an_axis_that_rests_is_no_disc(runs):
+    """15 arcsec of noise about one angle: a disc of half a radian would turn the base as that noise does."""
+    for run in range(runs):
+        rng = np.random.default_rng([run, 9])
+        turns = made(rng, size=np.radians(0.003 * 100.0 ** rng.random()))
+        noise = 15.0 * ARCSEC * rng.standard_normal(len(turns.time))
+        angles = np.column_stack([turns.angles[:, 0], turns.angles[0, 1] + noise])
+        C = C_bs_from_angles("zx", angles)
+        off = C[:, :, 0] * noise[:, None]
+        turns = replace(
+            turns, turn=turns.turn - off, angles=angles, C_bs=C, directions=(turns.directions[0], C[:, :, 0])
+        )
+        assert not {"2.1", "2.2"} & errors_of(turns).keys()
 
 
 @few_and_all(30, few=3)

@@ -219,21 +219,21 @@ def _aligned(
     tell("aligning")
     part, start = handed(noise)
     _check_length(part, slave.source)
-    rows = Matching(*noise, what.kind, limit("master's gate"))
     along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
-    run = partial(along, master=master, matching=rows)
+    run = partial(along, master=master, matching=Matching(*noise, what.kind, limit("master's gate")))
     track = run(part, model=model, start=start)
 
     def of_another_imu(other: ImuSpec) -> Track:
         """The same measurements of a slave by another specification, with the master's errors estimated."""
-        own = _model(other, said, what, flexure, errors, same_axes(other, said, model.groups))
-        own = replace(own, considered=False)
+        axes = same_axes(other, said, model.groups)
+        own = replace(_model(other, said, what, flexure, errors, axes), considered=False)
         _, begun = hand_over(slave, master, own, other, said, noise, position=position)
         return run(part, model=own, start=begun)
 
-    def of_another_master(errors: MasterErrors) -> Track:
-        """The same of a master with such errors, which are estimated."""
-        own = replace(_model(spec, said, what, flexure, errors, model.axes), considered=False)
+    def of_another_master(drift: float) -> Track:
+        """The same of a master whose heading drifts by so much, rad; its errors are estimated."""
+        of = replace(errors, heading_drift=drift)
+        own = replace(_model(spec, said, what, flexure, of, model.axes), considered=False)
         _, begun = hand_over(slave, master, own, spec, said, noise, position=position)
         return run(part, model=own, start=begun, nominal=found.nominal.with_states(own.states))
 
@@ -277,7 +277,7 @@ def _rivals(
     spec: ImuSpec,
     said: Assumed,
     of_another_imu: Callable[[ImuSpec], Track],
-    of_another_master: Callable[[MasterErrors], Track],
+    of_another_master: Callable[[float], Track],
 ) -> list[Evidence]:
     """What else would explain the log; `run` with a slave, a model and a start, or the same of another IMU.
 

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed
 from truenorth.core.errors import DataError
-from truenorth.errors.master import ATTITUDE_ERROR, DELAY, MasterErrors, TransferModel
+from truenorth.errors.master import ATTITUDE_ERROR, DELAY, TransferModel
 from truenorth.estimate.rivals import Rival, effect_of, likelihood_ratio
 from truenorth.state.evidence import Evidence, contradiction
 from truenorth.state.limits import limit
@@ -30,24 +29,26 @@ from truenorth.state.track import Track
 LADDER = tuple(math.radians(drift / 60.0) for drift in (1.0, 6.0, 36.0))
 
 
-def drifting_rivals(run: Callable[[MasterErrors], Track], first: Track, model: TransferModel) -> list[Rival]:
-    """Drifts of the master's heading that the log fits better than chance explains; none where no attitude is matched.
+def drifting_rivals(run: Callable[[float], Track], first: Track, model: TransferModel) -> list[Rival]:
+    """Drifts of the master's heading that the log fits better than chance explains; none where no row bears its attitude.
 
     Parameters
     ----------
     run : callable
-        The same log with such errors of the master, estimated.
+        The same log of a master whose heading drifts by so much, rad, and which is otherwise as it was said to be; its errors are
+        estimated.
     first : Track
         Of the model itself, the master's errors estimated.
     model : TransferModel
     """
     found, before = [], 0.0
-    said = model.master
+    said = model.master.attitude_drifts[2]
     for drift in LADDER:
-        larger = math.hypot(said.attitude_drifts[2], drift)
         try:
-            other = run(replace(said, heading_drift=larger))
+            other = run(math.hypot(said, drift))
         except DataError:  # the filter broke down: no explanation
+            break
+        if other.layout.slice_of(ATTITUDE_ERROR) is None:
             break
         ratio = likelihood_ratio(first.residuals, other.residuals, whitened=True)
         if ratio > limit("rival"):

@@ -23,6 +23,7 @@ HARMONICS = (1, 2)
 DETUNED = (-3, -2, -1, 1, 2, 3)  # turns more in the whole log, of patterns nearly as fast
 BAND = (-1.0, -0.5, 0.0, 0.5, 1.0)  # the same, of a sway that is one line to the log
 FINER = 8  # times the steps of a spectrum by its own length, in which its highest line is looked for
+TURNS = 0.1  # rad by which an axis turns that shows a disc
 STAYS = 0.9  # length of the mean direction of an axis: more, and it stays within some tens of degrees
 LIKE = 0.05  # of the energy of a pattern: where no more than that is its own, a sway of one line may make it
 
@@ -94,11 +95,16 @@ def waves(direction: Array, phase: Array) -> Array:
 
 
 def patterns_of(turns: Turns) -> Iterator[tuple[str, Array]]:
-    """By what errors of the angles turn the base, by name: ``zero``, and ``1.2`` for the first axis twice a turn."""
+    """By what errors of the angles turn the base, by name: ``zero``, and ``1.2`` for the first axis twice a turn.
+
+    The disc of an axis that rests is a zero. What its angle changes by is the encoder's noise, which turns the base as computed: a
+    disc of half a radian would explain all of it.
+    """
     if len(turns.directions) > 1:
         yield "zero", turns.directions[-1][:, :, None]
     for axis, u in enumerate(turns.directions):
-        for n in HARMONICS:
+        rests = np.ptp(turns.angles[turns.there, axis]) < TURNS
+        for n in () if rests else HARMONICS:
             yield f"{axis + 1}.{n}", waves(u, n * turns.angles[:, axis])
 
 
