@@ -21,7 +21,7 @@ def two_moments(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask
     apart = replace(task, antenna=antenna)
     try:
         track = apart.run(found.guess, gated=True)
-        if not explained_by_two(track, found.track):
+        if not explained_by_two(track, found.track, delays=True):
             return task, found
         return _settled(apart.learnt(track)[0], found, first)
     except DataError:  # the filter broke down: they are of one moment

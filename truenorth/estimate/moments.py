@@ -48,9 +48,13 @@ def velocities_apart(mounting: Mounting, record: GnssRecord | None) -> Mounting:
     return replace(mounting, velocities=Clock(mounting.latency, max(mounting.latency_sigma, LATENCY_SIGMA)))
 
 
-def explained_by_two(two: Track, one: Track) -> bool:
-    """Whether a track with two delays explains the log better than one with one."""
-    if likelihood_ratio(one.residuals, two.residuals) > limit("rival"):
+def explained_by_two(two: Track, one: Track, *, delays: bool = False) -> bool:
+    """Whether a track with two delays, or with a swing that is shown otherwise, explains the log better than one with one.
+
+    With `delays` it is a second delay. Places of another moment are off along the way, as slowly as the vehicle turns: the colour
+    that a second delay takes out of innovations is no reason to believe them less.
+    """
+    if likelihood_ratio(one.residuals, two.residuals, whitened=delays) > limit("rival"):
         return True
     fewer = sum(r.rejected for r in two.residuals) < sum(r.rejected for r in one.residuals)
     return fewer and bounded_misfit(one.residuals) - bounded_misfit(two.residuals) > limit("rival")

@@ -317,7 +317,7 @@ def _of_two_moments(plan: Plan, given: dict[str, Any], track: Track, smooth: boo
     apart = {**given, Gnss.key: receiver.mounted(antenna)}
     try:
         two = plan.run(plan.sources(apart))
-        if not explained_by_two(two, track):
+        if not explained_by_two(two, track, delays=True):
             return given, track
         apart = delayed(plan, apart, two)
         return apart, plan.run(plan.sources(apart), smooth=smooth)
