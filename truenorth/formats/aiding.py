@@ -26,8 +26,8 @@ from truenorth.formats.opening import columns_of
 from truenorth.formats.order import ordered
 from truenorth.formats.phone import new_fixes
 from truenorth.formats.positions import columns_of_positions
-from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, find
-from truenorth.formats.zipped import of_folder
+from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, find, understood
+from truenorth.formats.zipped import of_folder, unpacked
 from truenorth.records import EncoderRecord, HeightRecord, OdometerRecord, VelocityRecord
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ ODOMETER = (
     Quantity("distance", "length", "m", ("increment",)),
     Quantity("distance_unsigned", "length", "m"),
     Quantity("distance_total", "length", "m", ("mileage", "odometer")),
-    Quantity("speed", "speed", "m/s", ("velocity", "v", "wheel_speed", "odo (m/s)")),
+    Quantity("speed", "speed", "m/s", ("velocity", "v", "wheel_speed"), otherwise=("odo",)),
     Quantity("speed_unsigned", "speed", "m/s"),
     Quantity("pulse_size", "length", "m"),
 )
@@ -120,12 +120,9 @@ def read_odometer(
     DataError
         Bad data: with file, line (or row) and column.
     """
-    found, others = open_log(
-        of_folder(as_path(path, "log"), "odometer"),
-        format,
-        ODOMETER,
-        {"columns": columns, "units": units, "pulse_size": pulse_size, "signed": signed},
-    )
+    given = {"columns": columns, "units": units, "pulse_size": pulse_size, "signed": signed}
+    with unpacked(as_path(path, "log"), "odometer") as log:
+        found, others = open_log(of_folder(log, "odometer"), format, ODOMETER, given)
     asked = [name for name in COUNTS if {name, f"{name}_unsigned"} & found.asked]
     present = [name for name in COUNTS if found.has(name) or found.has(f"{name}_unsigned")]
     if not present:
@@ -269,6 +266,7 @@ def open_log(
     """
     path = as_path(path, "log")
     known_keys = [key for key in given if key not in ("columns", "units")]
+    receiver = part == "gnss"
     try:
         chosen = format_of(path, format, AIDING_SUFFIXES, "a log of named columns")
         device = chosen in devices.DEVICES
@@ -283,13 +281,19 @@ def open_log(
             columns = devices.columns(path, chosen, part or "gnss", values.get("topic"))
         else:
             own = columns_of_positions(path) if part == "gnss" and chosen == "csv" else None
-            columns = own or with_clock_file(columns_of(path, chosen, bool(options.columns), part))
+            columns = own or columns_of(path, chosen, bool(options.columns), part)
         if not columns.named:
             example = ",".join(q.name for q in quantities[:4])
             raise DataError(
                 f"{path.name}: numbers, and no header of names above them; expected one such as {example}: add it"
             )
-        found = ordered(find(columns, quantities, options))
+        times = None
+        if chosen == "csv" and columns.named and "time" not in options.columns:
+            unknown = [name for name, means in understood(columns.names, quantities, options, receiver) if not means]
+            columns, times = with_clock_file(columns, unknown)
+        found = ordered(find(columns, quantities, options, receiver))
+        if times is not None:
+            found = replace(found, source=f"{found.source}, clock of {times}")
         return new_fixes(found, columns.names) if part == "gnss" and not device else found, others
     except OSError as error:
         raise unreadable(path, error) from None

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 LONG_STEP = 100.0  # s: sensors that aid seldom wait so long
 FASTEST = 1000.0  # m/s, of what carries a receiver
-SENSOR = re.compile(r"(?:gps|gnss)[_ ](?!time)", re.IGNORECASE)  # in front of all headings of a receiver: ``gps_lat``
+RECEIVER = re.compile(r"(?:gps|gnss)[_ .-]", re.IGNORECASE)  # in front of all headings of a receiver: ``gps_lat``
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,8 @@ class Quantity:
     aliases: tuple[str, ...] = ()  # other usual names
     opposite: tuple[str, ...] = ()  # names of the same quantity counted the other way, such as ``VD`` of ``VU``
     group: str = ""  # by which `units` may name it along with others, such as ``velocity``
+    # names that mean it where no heading means anything else, in a unit of its dimension: ``odo (m/s)`` is a speed
+    otherwise: tuple[str, ...] = ()
 
 
 Meaning = tuple[Quantity, float, str | None]  # a quantity, its sign, and the unit that the heading names
@@ -140,8 +142,8 @@ def _pairs(key: str, value: Any, allowed: Sequence[str]) -> dict[str, str]:
     return {name: str(text) for name, text in value.items()}
 
 
-def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> Found:
-    """Read what a log has of the `quantities`, in SI.
+def find(columns: Columns, quantities: Sequence[Quantity], options: Options, receiver: bool = False) -> Found:
+    """Read what a log has of the `quantities`, in SI; of a `receiver`, whose headings may all begin with ``gps_``.
 
     Raises
     ------
@@ -154,7 +156,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
     claims: dict[str, list[tuple[str, float]]] = {}
     stated: set[str] = set()
     named = {ours: text if text in columns.names else text.removeprefix("-") for ours, text in options.columns.items()}
-    for name, meanings in _understood(columns.names, quantities).items():
+    for name, meanings in understood(columns.names, quantities, options, receiver):
         if name in named.values():
             continue
         for quantity, sign, unit in meanings:
@@ -233,12 +235,30 @@ def _of_epoch(time: Array, factor: float) -> float:
     return factor
 
 
-def _understood(names: Iterable[str], quantities: Sequence[Quantity]) -> dict[str, list[Meaning]]:
-    """What each heading may mean; where none but the clock's means anything, without the sensor's name in front of each."""
-    found = {name: list(_meanings(name, quantities)) for name in names}
-    if any(quantity.name != "time" for meanings in found.values() for quantity, _, _ in meanings):
+def understood(
+    names: Iterable[str], quantities: Sequence[Quantity], options: Options, receiver: bool
+) -> list[tuple[str, list[Meaning]]]:
+    """What each heading may mean.
+
+    Where none but the clock's means anything, and the caller names none, headings are read once more: without ``gps_`` in front of
+    those of a receiver, and by the names that mean a quantity in its own unit alone. A second clock is not looked for so.
+    """
+    found = [(name, list(_meanings(name, quantities))) for name in names]
+    if options.columns or any(quantity.name != "time" for _, meanings in found for quantity, _, _ in meanings):
         return found
-    return {name: list(_meanings(SENSOR.sub("", name), quantities)) or found[name] for name in found}
+    others = [quantity for quantity in quantities if quantity.name != "time"]
+
+    def once_more(name: str) -> Iterable[Meaning]:
+        if receiver and RECEIVER.match(name):
+            yield from _meanings(RECEIVER.sub("", name, count=1), others)
+        plain, unit = split(name)
+        written = None if unit is None else unit_in(unit)
+        dimension = None if written is None else parse_unit(written)[1]
+        for quantity in others:
+            if _key(plain) in quantity.otherwise and dimension == DIMENSIONS[quantity.dimension][0]:
+                yield quantity, 1.0, unit
+
+    return [(name, meanings or list(once_more(name))) for name, meanings in found]
 
 
 def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[Meaning]:
@@ -246,9 +266,7 @@ def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[Meaning]:
     plain, unit = split(name)
     words = _key(plain)
     ends = [(words, unit)]
-    if unit is not None:
-        ends += [(_key(name), unit)]  # a name that means this in this unit alone, such as ``odo (m/s)``
-    else:
+    if unit is None:
         ends += [(words[: m.start()], unit_in(words[m.end() :])) for m in re.finditer("_", words)]
     for base, stated in ends:
         if base != words and stated is None:

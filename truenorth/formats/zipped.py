@@ -28,7 +28,7 @@ def unpacked(path: Path, part: str = "imu") -> Iterator[Path]:
     path : Path
         A log of any format; one that is no such archive is given back as it is.
     part : str
-        What is read: ``imu``, or ``gnss``.
+        What is read: ``imu``, ``gnss`` or ``odometer``.
 
     Yields
     ------
@@ -52,9 +52,18 @@ def unpacked(path: Path, part: str = "imu") -> Iterator[Path]:
 
 
 def of_folder(folder: Path, part: str) -> Path:
-    """The file of the receiver in a folder of sensors; else the folder, which is refused by what reads it."""
+    """The file of a sensor (``gnss``, ``odometer``) in a folder; else the folder, which is refused by what reads it.
+
+    Raises
+    ------
+    DataError
+        Several such files.
+    """
     files = files_of(folder).get(part, []) if folder.is_dir() else []
-    return files[0] if len(files) == 1 else folder
+    if len(files) > 1:
+        names = ", ".join(path.name for path in files)
+        raise DataError(f"{folder.name}: {len(files)} files of one sensor: {names}; expected one: name the file")
+    return files[0] if files else folder
 
 
 def is_archive(path: Path) -> bool:
