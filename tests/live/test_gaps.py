@@ -5,6 +5,8 @@ import pytest
 
 from tests.live.test_siblings import SWELL, Anchored
 from truenorth.live import GnssFeed, Navigator
+from truenorth.live.bridges import bridged
+from truenorth.live.log import Log
 from truenorth.navigation import navigate
 from truenorth.records import ImuRecord
 from truenorth.simulation import simulate
@@ -70,6 +72,24 @@ def test_gaps_in_any_chunks_saved_or_not_are_the_same_bits(tmp_path):
     case.feed(other, 12, since=20.3)
     for name in ("v_n", "position", "v_sigma"):
         np.testing.assert_array_equal(getattr(one.answer.motion, name), getattr(other.answer.motion, name))
+
+
+@pytest.mark.parametrize("kind", ["increments", "rates"])
+def test_a_vehicle_that_stood_may_drive_off_in_a_gap(kind):
+    """Its push before and behind it differs by 3 m/s^2: what it gained in 0.5 s is known to a step that came at any time."""
+    time = 0.02 * np.arange(1.0, 4001.0)
+    rows = np.zeros((len(time), 7))
+    rows[:, 0] = time
+    rows[:, 1:] = 0.001 * np.random.default_rng(1).standard_normal((len(time), 6))
+    rows[-1, 5] += 3.0
+    rows[-1, 0] += 0.5
+    if kind == "increments":
+        rows[:, 1:] *= 0.02
+    log = Log(kind)
+    log.add(rows)
+    _, (possible,), gaps = bridged(rows[-50:], rows[-51], 0.02, log, begins=False)
+    assert len(gaps) == 1
+    assert float(np.sqrt(possible.measured).max()) == pytest.approx(0.5 * 3.0 / np.sqrt(12.0), rel=0.01)
 
 
 def test_aids_that_come_too_late_are_called_so():

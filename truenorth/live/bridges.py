@@ -73,8 +73,15 @@ def _samples(rows: Array, log: Log) -> ImuRows:
 
 
 def _unrest(log: Log, until: float) -> tuple[float, float]:
-    """How much turn rate and specific force differ in the last minute of rows: standard deviations of the worst axis."""
+    """How much turn rate and specific force differ from their even course in a gap that ends then, of the worst axis.
+
+    As much as in the last minute of rows; and as a step between the rows next to the gap, which may have come at any time in it:
+    its integral is off by ``step / sqrt(12)`` of the gap. A vehicle that stood for a minute may drive off in a gap.
+    """
     part = log.record(until - UNREST, until)
     scale = 1.0 if part.kind == "rates" else 1.0 / part.interval
-    turn, push = (float(np.std(values * scale, axis=0).max()) for values in (part.gyro, part.accel))
+    turn, push = (
+        float(scale * np.sqrt(np.var(values, axis=0) + (values[-1] - values[-2]) ** 2 / 12.0).max())
+        for values in (part.gyro, part.accel)
+    )
     return turn, push
