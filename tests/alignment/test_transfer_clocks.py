@@ -49,6 +49,20 @@ def test_a_clock_that_steps_between_them_is_named(logs):
 
 
 @pytest.mark.parametrize("run", range(3))
+@pytest.mark.parametrize("step", [0.0, 1.0, 22.0])
+def test_the_end_of_a_log_that_resembles_a_turn_is_no_other_clock(run, step):
+    """100 s with two S-turns, two rows a second: the last third fits the last 11 s best, by how rows lie. 22 s were named."""
+    legs = [*straight(15.0), *s_turn(20 * DEG, 3 * DEG), *straight(30.0), *s_turn(20 * DEG, 3 * DEG), *straight(300.0)]
+    way = course(Position.from_degrees(50.0, 20.0, 3000.0), legs, heading=0.6, speed=100.0)
+    seeds = {"seed": 6120, "run": run}
+    slave = simulate(way, rate=50.0, duration=100.0, imu=imu_spec("tactical"), **seeds).record
+    of_master = MasterSpec(rate=2.0, velocity_noise=0.05, attitude_noise=DEG / 60.0)
+    master = simulate_sensor(way, of_master, duration=100.0, **seeds).record
+    stepped = replace(master, time=master.time + step * (master.time > 50.0))
+    assert (parted_clocks(slave, stepped, np.eye(3), 0.0) is not None) == (step > 0.0)
+
+
+@pytest.mark.parametrize("run", range(3))
 def test_what_happened_in_an_outage_has_no_course_in_time(run):
     """A turn that begins while the master is silent: between its rows it would seem to turn slowly all the while."""
     inputs, _ = BENCHES["attitude"].draw(11, run)

@@ -122,24 +122,37 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: fl
     parts = _unbroken(master[:first]), _unbroken(master[last:])
     if min(map(len, parts)) < 2:
         return None
-    begin, end = (find_delay(slave, part, C_mb) for part in parts)
-    if not (begin.sure and end.sure) or abs(end.delay - begin.delay) < shortest:
+    found = [find_delay(slave, part, C_mb) for part in parts]
+    if not all(part.sure for part in found):
+        return None
+    begin, end = (_likely(slave, part, C_mb, one.delay) for part, one in zip(parts, found, strict=True))
+    if abs(end - begin) < shortest:
         return None
     # What comes again and again, such as a sea or a rotor, agrees at many delays, and chance says which is best: one that fits
     # both parts is that of the clock.
-    own = [_left(slave, part, C_mb, found.delay) for part, found in zip(parts, (begin, end), strict=True)]
-    for one in (begin.delay, end.delay, likeliest_delay(slave, _unbroken(master), C_mb)):
+    own = [_left(slave, part, C_mb, one) for part, one in zip(parts, (begin, end), strict=True)]
+    for one in (begin, end, likeliest_delay(slave, _unbroken(master), C_mb)):
         if all(_left(slave, part, C_mb, one) < MISFIT * least for part, least in zip(parts, own, strict=True)):
             return None
     return contradiction(
         "transfer.clocks_part",
         "part_of_logs",
         "put_times_right",
-        before=begin.delay,
+        before=begin,
         until=float(master.time[first - 1]),
-        after=end.delay,
+        after=end,
         since=float(master.time[last]),
     )
+
+
+def _likely(slave: ImuRecord, part: MasterRecord, C_mb: Array, found: float) -> float:
+    """Delay of a part, s: that at which it agrees best, or the likeliest where that is another one.
+
+    A turn at the end of the slave's log agrees with the first rows of a part as well as with a turn of its own: these alone are
+    compared there, and how rows a good part of a second apart lie in a turn says which is better.
+    """
+    likeliest = likeliest_delay(slave, part, C_mb)
+    return likeliest if abs(likeliest - found) > AGAIN else found
 
 
 def _left(slave: ImuRecord, part: MasterRecord, C_mb: Array, delay: float) -> float:

@@ -75,9 +75,10 @@ class LoopState:
     rows: ImuRows | None  # the last two rows of the record, or one that waits for a second
     interval: float  # s; nominal, of the samples
     begin: float  # s; of the first sample
-    outside: tuple[int, ...]  # measurements of each source that came for a time already passed
+    outside: tuple[int, ...]  # measurements of each source that no sample covers
     fresh: bool = True  # it has taken nothing yet
     finished: bool = False  # the last sample was said to be the last
+    passed: tuple[int, ...] = ()  # of those outside: they came for a time already passed
 
 
 def received(setting: Setting, state: LoopState, aiding: Sequence[Aiding]) -> LoopState:
@@ -121,10 +122,9 @@ def planned(setting: Setting, state: LoopState, horizon: int, last: bool) -> tup
     first = _reached(state)
     edge = ends[horizon - 1] if horizon else state.begin
     passed, due = at < first, (at >= first) & (at <= edge)
-    outside = tuple(
-        before + int(np.sum(waiting.source[passed | ((at > edge) & last)] == k))
-        for k, before in enumerate(state.outside)
-    )
+    outside = _counted(state.outside, waiting.source[passed | ((at > edge) & last)])
+    # What lies before the first sample of all has come in time.
+    gone = state.passed if state.fresh else _counted(state.passed, waiting.source[passed])
     width = waiting.measured.shape[1]
     events = Rows(
         np.append(times, at[due]),
@@ -135,7 +135,12 @@ def planned(setting: Setting, state: LoopState, horizon: int, last: bool) -> tup
     )
     # By time, measurements before the output of their time.
     order = np.lexsort(np.stack([1.0 * (events.source == -1), events.time]))
-    return events.at(order), replace(state, waiting=waiting.at(~(passed | due)), outside=outside)
+    return events.at(order), replace(state, waiting=waiting.at(~(passed | due)), outside=outside, passed=gone)
+
+
+def _counted(before: tuple[int, ...], more: Integers) -> tuple[int, ...]:
+    """How many measurements there are of each source, with those of the sources `more`."""
+    return tuple(count + int(np.sum(more == k)) for k, count in enumerate(before))
 
 
 def _reached(state: LoopState) -> float:

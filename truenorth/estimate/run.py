@@ -102,18 +102,8 @@ def begin(
     width = max([3, *(source.measured.shape[1] for source in setting.sources)])
     nothing = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, bool), np.zeros((0, width)), np.zeros((0, 3)))
     empty = Samples(np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
-    state = LoopState(
-        memory(s, aux, P0[0], time, len(setting.sources), off),
-        empty,
-        0,
-        0,
-        nothing,
-        nothing,
-        None,
-        interval,
-        time,
-        (0,) * len(setting.sources),
-    )
+    kernel_memory, none = memory(s, aux, P0[0], time, len(setting.sources), off), (0,) * len(setting.sources)
+    state = LoopState(kernel_memory, empty, 0, 0, nothing, nothing, None, interval, time, none, passed=none)
     return received(setting, state, setting.sources)
 
 
@@ -276,7 +266,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
     code, taken, event, row_, outputs = kernel.run(padded(n), task, m, kept)
     if code != SOUND:
         _raise(code, kept.when[event], sources[int(np.append(plan.source, late.source)[event])])
-    residuals = _residuals(sources, plan, late.at(np.arange(row_)), kept, after.outside)
+    residuals = _residuals(sources, plan, late.at(np.arange(row_)), kept, after)
     left, first = late.at(np.arange(row_, len(late.time))), max(0, taken - BACK)
     tail = Samples(*(a[first:] for a in state.samples))
     after = replace(
@@ -365,7 +355,7 @@ def kernel_sources(aiding: Sequence[Aiding], model: InsModel) -> Sources:
 
 
 def _residuals(
-    sources: Sequence[Aiding], plan: Rows, late: Rows, kept: Kept, outside: Sequence[int]
+    sources: Sequence[Aiding], plan: Rows, late: Rows, kept: Kept, after: LoopState
 ) -> tuple[Residuals, ...]:
     of = np.append(plan.source, late.source)
     verdict = kept.verdict[: len(of)]
@@ -382,11 +372,12 @@ def _residuals(
                 kept.sigma[rows],
                 kept.nis[rows],
                 verdict[rows] != REJECTED,
-                outside[number],
+                after.outside[number],
                 np.append(plan.time, late.time)[rows],
                 verdict[rows] == REOPENED,
                 source.row.unit,
                 source.row.axes,
+                after.passed[number],
             )
         )
     return tuple(found)

@@ -27,8 +27,15 @@ Array = NDArray[np.float64]
 
 
 def without_spikes(record: ImuRecord) -> tuple[ImuRecord, int]:
-    """The record with spikes replaced by what their neighbours say, and how many there were."""
-    gyro, accel = ([_mended(x, record.interval) for x in sensor.T] for sensor in (record.gyro, record.accel))
+    """The record with spikes replaced by what their neighbours say, and how many there were.
+
+    A row of increments that holds a gap as well is as long as that: its mean rate is compared.
+    """
+    rows = np.ones(len(record))
+    if record.kind == "increments":
+        gaps = record.gaps[record.gaps > 0]
+        rows[gaps] = record.steps[gaps] / record.interval
+    gyro, accel = ([_mended(x, rows, record.interval) for x in sensor.T] for sensor in (record.gyro, record.accel))
     count = sum(number for _, number in (*gyro, *accel))
     if count == 0:
         return record, 0
@@ -36,13 +43,13 @@ def without_spikes(record: ImuRecord) -> tuple[ImuRecord, int]:
     return replace(record, gyro=turns, accel=forces), count
 
 
-def _mended(values: Array, interval: float) -> tuple[Array, int]:
-    """A channel (N,) without spikes, and their number."""
-    at, said = spikes_of(values, interval)
+def _mended(values: Array, rows: Array, interval: float) -> tuple[Array, int]:
+    """A channel (N,) without spikes, and their number; `rows` (N,): how many rows each value holds."""
+    at, said = spikes_of(values / rows, interval)
     if not len(at):
         return values, 0
     mended = values.copy()
-    mended[at] = said
+    mended[at] = said * rows[at]
     return mended, len(at)
 
 

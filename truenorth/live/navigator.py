@@ -26,7 +26,7 @@ from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.rivals import counted_once
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.answer import Answer, Motion
-from truenorth.live.bridges import bridges
+from truenorth.live.bridges import Gap, bridged
 from truenorth.live.feed import Feed
 from truenorth.live.felt import Felt, without_known
 from truenorth.live.intake import LATE, Intake, as_rows
@@ -58,7 +58,7 @@ Array = NDArray[np.float64]
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
     "start", "spec", "_given", "_imu", "_imu_source", "feeds", "_mountings", "altitude", "intake", "log", "output", "failure",
-    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps", "_noise", "_siblings",
+    "past", "_waiting", "_state", "_interval", "_last", "_sent", "_gaps", "_noise", "_siblings",
 )  # fmt: skip
 FIRST = 20  # rows that show the interval of sampling
 STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
@@ -121,7 +121,9 @@ class Navigator:
         self._setting: Setting | None = None
         self._state: LoopState | None = None
         self._interval = 0.0
-        self._loop_end = self.start.time
+        self._last = np.full(
+            7, self.start.time
+        )  # the row that the loop took last, as it came; of the start its time alone counts
         self._sent: dict[str, dict[str, float]] = {key: {} for key in self.feeds}
         self._gaps: list[tuple[float, float]] = []
         self._noise = NoiseSeen(self.spec, kind)
@@ -271,6 +273,11 @@ class Navigator:
 
     # The loop
 
+    @property
+    def _loop_end(self) -> float:
+        """Up to where the loop has taken rows, s."""
+        return float(self._last[0])
+
     def _begin(self, rows: Array) -> None:
         """Make the loop ready, when enough rows are there to know their interval."""
         self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
@@ -311,22 +318,21 @@ class Navigator:
         assert self._setting is not None
         assert self._state is not None
         try:
-            begins = self._loop_end == self.start.time
             measured = self._measurements()
-            bridged, gaps = bridges(part[:, 0], self._loop_end, self._interval, self.log, begins=begins)
+            samples, disturbances, gaps = self._bridged(part)
             self._gaps += gaps
-            aiding = [*measured, *bridged, self._noise.growth(part)]
-            samples = self._samples(part)
+            aiding = [*measured, *disturbances, self._noise.growth(part)]
             self._state, track = go_on(self._setting, self._state, samples, aiding)
         except DataError as error:
             self.failure = str(error)
             return
-        self._loop_end = float(part[-1, 0])
+        self._last = part[-1].copy()
         self.past.add(track)
         self._siblings.take(self._setting, samples, aiding, track)
 
-    def _samples(self, rows: Array) -> ImuRows:
-        return ImuRows(rows[:, 0], rows[:, 1:4], rows[:, 4:], self.log.source_kind, "live")
+    def _bridged(self, rows: Array) -> tuple[ImuRows, list[Aiding], list[Gap]]:
+        begins = self._loop_end == self.start.time
+        return bridged(rows, self._last, self._interval, self.log, begins=begins)
 
     def _measurements(self) -> list[Aiding]:
         """New ones of all feeds; those of a feed whose rows cannot be are left out."""
@@ -345,11 +351,14 @@ class Navigator:
             return None
         waiting = np.vstack(self._waiting) if self._waiting else np.empty((0, 7))
         waiting = waiting[waiting[:, 0] > self._loop_end]
-        samples = None if not len(waiting) or self.failure else self._samples(waiting)
-        if samples is None:
-            found = self.past.last
-        else:
-            found = go_on(self._setting, self._state, samples, last=True)[1][-1:]
+        samples, found = None, self.past.last
+        if len(waiting) and not self.failure:
+            try:
+                samples, disturbances, _ = self._bridged(waiting)
+            except DataError:  # a gap too long to bridge, unless late rows fill it: the answer holds before it
+                pass
+            else:
+                found = go_on(self._setting, self._state, samples, disturbances, last=True)[1][-1:]
         if found is None:
             return None
         return found, self._siblings.now(self._setting, float(found.time[0]), samples), self._siblings.most

@@ -49,7 +49,8 @@ def innovation_evidence(
     in_sigma : container of str
         Sources whose slow errors are in sigma already: their colour is not counted again.
     """
-    found: list[Evidence] = []
+    sources = list(sources)
+    found = [note("innovations.late", name=source.name, late=source.passed) for source in sources if source.passed]
     sources = [source for source in sources if len(source.time)]
     at_rest = any(source.name in REST and _mostly_rejected(source) for source in sources)
     for source in sources:
@@ -79,8 +80,8 @@ def innovation_evidence(
         else:
             found += [] if source.name in in_sigma else _growth(source, sigma, by_motion)
             found += led_away_evidence(source)
-        if source.outside:
-            found.append(note("innovations.outside", name=source.name, outside=source.outside))
+        if (outside := source.outside - source.passed) > 0:
+            found.append(note("innovations.outside", name=source.name, outside=outside))
     return found
 
 

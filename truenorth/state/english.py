@@ -129,6 +129,10 @@ SENTENCES = {
         "of white ones): sigma grows {growth:.1f} times"
     ),
     "innovations.left": "{name}: what the answer leaves of it is {size:.2f} times as large as sigma says: sigma grows as much",
+    "innovations.late": (
+        "{name}: {late} measurements came more than a second after the IMU's rows of their time, or alone at the start, until the "
+        "next one came: this running answer leaves them out"
+    ),
     "innovations.outside": "{name}: {outside} measurements lie before the start or after the end of the IMU's log",
     "innovations.wander": (
         "{name}: its errors follow each other from row to row (correlation {correlation:.2f}) and wander by {wander:.2g} {unit} or "

@@ -40,7 +40,7 @@ class Residuals:
     used : (M,) array of bool
         Not rejected by the gate.
     outside : int
-        Measurements before the start or after the end of the IMU's log.
+        Measurements before the start or after the end of the IMU's log, and those that came too late.
     stamp : (M,) array, s
         The measurements' own times, which differ from `time` where they are re-timed.
     jumped : (M,) array of bool
@@ -49,6 +49,8 @@ class Residuals:
         Of the innovations, SI.
     axes : tuple of str
         Names of their components.
+    passed : int
+        Of `outside`: measurements that came when a run had gone past their time.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Residuals:
     jumped: NDArray[np.bool_]
     unit: str = "m/s"
     axes: tuple[str, ...] = ("east", "north", "up")
+    passed: int = 0
 
     @property
     def rows(self) -> NDArray[np.int64]:
