@@ -42,25 +42,13 @@ def with_clock_file(columns: Columns, unknown: Sequence[str]) -> tuple[Columns, 
     rows = len(columns.column(columns.names[0]))
     for file in files:
         with suppress(DataError):  # no times: another file of that name
-            clock = _times(file)
-            name = clock.names[0]
-            if name not in columns.names and len(clock.column(name)) == rows and _increases(clock, name):
+            table = open_table(file)
+            name, *others = table.names
+            clock = Columns(file, table.names, table.read, table.column, table.place)
+            alone = table.named and not others and name not in columns.names
+            if alone and len(clock.column(name)) == rows and _increases(clock, name):
                 return _in_front(columns, clock, name), file.name
     return columns, None
-
-
-def _times(file: Path) -> Columns:
-    """The only column of a file of times.
-
-    Raises
-    ------
-    DataError
-        There are more, or no heading.
-    """
-    table = open_table(file)
-    if not table.named or len(table.names) != 1:
-        raise DataError(f"{file.name}: columns {', '.join(table.names)}; expected times alone")
-    return Columns(file, table.names, table.read, table.column, table.place)
 
 
 def _increases(columns: Columns, name: str) -> bool:
