@@ -87,9 +87,52 @@ def test_a_vehicle_that_stood_may_drive_off_in_a_gap(kind):
         rows[:, 1:] *= 0.02
     log = Log(kind)
     log.add(rows)
-    _, (possible,), gaps = bridged(rows[-50:], rows[-51], 0.02, log, begins=False)
+    _, (possible,), gaps = bridged(rows[-50:], rows[-51], np.empty(0), 0.02, log, begins=False)
     assert len(gaps) == 1
     assert float(np.sqrt(possible.measured).max()) == pytest.approx(0.5 * 3.0 / np.sqrt(12.0), rel=0.01)
+
+
+def test_rows_that_are_stamped_late_are_no_gaps():
+    """Nothing is lost, and the clock comes back: gravity of a gap would be 17 sigmas of velocity."""
+    case = Gappy(lost=(), duration=45.0)
+    late = np.random.default_rng(2).random(len(case.log)) < 0.01
+    late[:20] = late[-8:] = False
+    case.log = ImuRecord(case.log.time + 0.03 * late, case.log.gyro, case.log.accel, "increments")
+    run = case.run()
+    answers = case.feed(run, 3, every=1.0)
+    assert late.sum() > 5
+    assert run._gaps == []
+    assert sum(r.rejected for r in run.residuals) == 0
+    assert np.abs(case.off_velocity(answers)).max() < 4.0
+
+
+def test_stamps_of_milliseconds_make_no_gaps():
+    """400 rows a second: steps of 2 and 3 ms, of which the longer ones are 1.5 times the shorter."""
+    time = np.round(0.0025 * np.arange(1.0, 4001.0) + 0.0004, 3)
+    rows = np.hstack([time[:, None], np.zeros((4000, 6))])
+    log = Log("increments")
+    log.add(rows)
+    assert bridged(rows[1:], rows[0], np.empty(0), 0.002, log, begins=False)[1:] == ([], [])
+
+
+@pytest.mark.parametrize("after", [3000, 3001, 3002, 3003])
+@pytest.mark.parametrize("kind", ["increments", "rates"])
+def test_what_may_have_happened_in_a_gap_is_the_same_of_rows_that_are_added_up(kind, after):
+    """A row of several, and of rates one that holds the gap with gravity, says nothing of a step in it."""
+    time = 0.01 * np.arange(1.0, 5001.0)
+    time[after:] += 0.9
+    rows = np.zeros((len(time), 7))
+    rows[:, 0] = time
+    rows[:, 1:] = 0.001 * np.random.default_rng(1).standard_normal((len(time), 6))
+    rows[:, 6] += 9.8
+    if kind == "increments":
+        rows[:, 1:] *= 0.01
+    log = Log(kind, most=1000)
+    log.add(rows)
+    assert log.merged > 1
+    _, (possible,), gaps = bridged(rows[after - 5 :], rows[after - 6], np.empty(0), 0.01, log, begins=False)
+    assert len(gaps) == 1
+    assert float(np.sqrt(possible.measured).max()) < 0.9 * 0.01
 
 
 def test_aids_that_come_too_late_are_called_so():

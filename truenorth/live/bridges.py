@@ -15,16 +15,18 @@ from truenorth.strapdown.increments import ImuRows
 Array = NDArray[np.float64]
 Gap = tuple[float, float]  # s: the row before it, its length
 
+BACK, SOON = 9, 0.5  # rows and s next to a long step, which say how long an interval is, and whether rows are missing
+ONE_LOST = 1.9  # intervals, of a step with one row lost; less is a row that is late
 UNREST = 60.0  # s before a gap, whose motion says what may have happened in it
 
 
 def bridged(
-    rows: Array, last: Array, interval: float, log: Log, *, begins: bool
+    rows: Array, last: Array, coming: Array, interval: float, log: Log, *, begins: bool
 ) -> tuple[ImuRows, list[Aiding], list[Gap]]:
     """Rows of which those after a gap hold the whole of it, what the vehicle may have done in gaps, and the gaps.
 
     As :func:`truenorth.estimate.gaps.bridge_gaps` has it of a whole log: increments that are lost are velocity and angle that are
-    lost, gravity's above all.
+    lost, gravity's above all. A row that is stamped late is no gap: the clock comes back with the next rows.
 
     Parameters
     ----------
@@ -32,6 +34,8 @@ def bridged(
         ``time, gyro (3), accel (3)``, ascending, as they came.
     last : (7,) array
         The row before them as it came; of a run that begins its time alone counts.
+    coming : (M,) array
+        Times of rows that came after these, ascending.
     interval : float, s
     log : Log
         With these rows.
@@ -47,24 +51,56 @@ def bridged(
     steps = np.diff(time, prepend=last[0])
     if begins:
         steps[0] = interval
-    at = np.flatnonzero(steps > GAP_FACTOR * interval)
+    long = np.flatnonzero(steps > GAP_FACTOR * interval)
+    pace = np.array([_pace(log, float(time[row] - steps[row]), interval) for row in long])
+    after = np.concatenate([time, coming])
+    lacks = np.array([_lacks_rows(after[row:], steps[row], own) for row, own in zip(long, pace)], dtype=bool)
+    at, pace = long[lacks], pace[lacks]
     if not at.size:
         return _samples(rows, log), [], []
-    missing = steps[at] - interval
+    missing = steps[at] - pace
     if missing.max() > LONGEST_BRIDGE:
         raise DataError(
             f"a gap of {steps[at].max():.3f} s in the rows of the IMU; expected {LONGEST_BRIDGE:g} s at most: what the "
             "vehicle did in it is not known; align again"
         )
     gaps = [(float(time[row] - steps[row]), float(steps[row])) for row in at]
-    turn, push = np.array([_unrest(log, float(time[row])) for row in at]).T * missing
+    before = np.vstack([last[None], rows[:-1]])[at, 1:]
+    across = rows[at, 1:] - before
     if log.source_kind == "increments":
-        before = np.vstack([last[None], rows[:-1]])[at]
-        lost = (steps[at] / interval - 1.0)[:, None]
+        lost = (steps[at] / pace - 1.0)[:, None]
         found = rows.copy()
-        found[at, 1:] += 0.5 * lost * (rows[at, 1:] + before[:, 1:])
+        found[at, 1:] += 0.5 * lost * (rows[at, 1:] + before)
         rows = found
+        across /= pace[:, None]
+    unrest = np.array([_unrest(log, float(time[row]), step) for row, step in zip(at, across)])
+    turn, push = missing * unrest.T
     return _samples(rows, log), [Aiding.disturbance("gap", time[at], push[:, None], turn[:, None])], gaps
+
+
+def unbroken(rows: Array, last: Array, interval: float, *, begins: bool) -> Array:
+    """Rows (K, 7) up to the first gap that is too long to bridge; `last` and `begins` as above."""
+    too_long = np.diff(rows[:, 0], prepend=last[0]) - interval > LONGEST_BRIDGE
+    if begins and len(rows):
+        too_long[0] = False
+    return rows[: np.argmax(too_long)] if too_long.any() else rows
+
+
+def _pace(log: Log, until: float, interval: float) -> float:
+    """The interval of the rows up to a time, s; stamps of milliseconds make two lengths of steps of one interval."""
+    time = log.rows[:, 0]
+    last = int(np.searchsorted(time, until, side="right"))
+    steps = np.diff(time[max(0, last - BACK) : last]) / log.merged
+    return float(np.mean(steps[steps <= 2.0 * np.median(steps)])) if len(steps) > 2 else interval
+
+
+def _lacks_rows(time: Array, step: float, interval: float) -> bool:
+    """Whether rows are missing in a long step, from the times of the rows after it: of a row that is late the clock comes back."""
+    near = time[:BACK][time[:BACK] <= time[0] + SOON]
+    if len(near) == 1 and step < ONE_LOST * interval:  # the newest row: the next ones will say
+        return False
+    over = near - (time[0] - step) - interval * np.arange(1, len(near) + 1)
+    return float(over.min()) > (GAP_FACTOR - 1.0) * interval
 
 
 def _samples(rows: Array, log: Log) -> ImuRows:
@@ -72,16 +108,17 @@ def _samples(rows: Array, log: Log) -> ImuRows:
     return ImuRows(rows[:, 0], rows[:, 1:4], rows[:, 4:], log.source_kind, "live")
 
 
-def _unrest(log: Log, until: float) -> tuple[float, float]:
+def _unrest(log: Log, until: float, across: Array) -> tuple[float, float]:
     """How much turn rate and specific force differ from their even course in a gap that ends then, of the worst axis.
 
-    As much as in the last minute of rows; and as a step between the rows next to the gap, which may have come at any time in it:
-    its integral is off by ``step / sqrt(12)`` of the gap. A vehicle that stood for a minute may drive off in a gap.
+    As much as in the last minute of rows; and as a step between the rows next to the gap (6,), which may have come at any time in
+    it: its integral is off by ``step / sqrt(12)`` of the gap. A vehicle that stood for a minute may drive off in a gap.
     """
     part = log.record(until - UNREST, until)
-    scale = 1.0 if part.kind == "rates" else 1.0 / part.interval
-    turn, push = (
-        float(scale * np.sqrt(np.var(values, axis=0) + (values[-1] - values[-2]) ** 2 / 12.0).max())
-        for values in (part.gyro, part.accel)
-    )
-    return turn, push
+    values = np.hstack([part.gyro, part.accel])
+    steps = np.diff(part.time)
+    whole = steps <= GAP_FACTOR * part.interval if len(part) > 1 else np.empty(0, dtype=bool)
+    if part.kind == "increments":  # also of rates that are added up
+        values = values[1:][whole] / steps[whole, None]
+    spread = np.sqrt(np.var(values, axis=0) + across**2 / 12.0) if len(values) else np.abs(across)
+    return float(spread[:3].max()), float(spread[3:].max())

@@ -26,7 +26,7 @@ from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.rivals import counted_once
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.answer import Answer, Motion
-from truenorth.live.bridges import Gap, bridged
+from truenorth.live.bridges import Gap, bridged, unbroken
 from truenorth.live.feed import Feed
 from truenorth.live.felt import Felt, without_known
 from truenorth.live.intake import LATE, Intake, as_rows
@@ -332,7 +332,9 @@ class Navigator:
 
     def _bridged(self, rows: Array) -> tuple[ImuRows, list[Aiding], list[Gap]]:
         begins = self._loop_end == self.start.time
-        return bridged(rows, self._last, self._interval, self.log, begins=begins)
+        coming = np.sort(np.concatenate([np.empty(0), *(block[:, 0] for block in self._waiting)]))
+        coming = coming[coming > rows[-1, 0]]
+        return bridged(rows, self._last, coming, self._interval, self.log, begins=begins)
 
     def _measurements(self) -> list[Aiding]:
         """New ones of all feeds; those of a feed whose rows cannot be are left out."""
@@ -351,14 +353,12 @@ class Navigator:
             return None
         waiting = np.vstack(self._waiting) if self._waiting else np.empty((0, 7))
         waiting = waiting[waiting[:, 0] > self._loop_end]
+        # A gap too long to bridge ends it, unless late rows fill it: the answer holds before it.
+        waiting = unbroken(waiting, self._last, self._interval, begins=self._loop_end == self.start.time)
         samples, found = None, self.past.last
         if len(waiting) and not self.failure:
-            try:
-                samples, disturbances, _ = self._bridged(waiting)
-            except DataError:  # a gap too long to bridge, unless late rows fill it: the answer holds before it
-                pass
-            else:
-                found = go_on(self._setting, self._state, samples, disturbances, last=True)[1][-1:]
+            samples, disturbances, _ = self._bridged(waiting)
+            found = go_on(self._setting, self._state, samples, disturbances, last=True)[1][-1:]
         if found is None:
             return None
         return found, self._siblings.now(self._setting, float(found.time[0]), samples), self._siblings.most
