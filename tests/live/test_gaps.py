@@ -5,7 +5,7 @@ import pytest
 
 from tests.live.test_siblings import SWELL, Anchored
 from truenorth.live import GnssFeed, Navigator
-from truenorth.live.bridges import bridged
+from truenorth.live.bridges import bridged, unbroken
 from truenorth.live.log import Log
 from truenorth.navigation import navigate
 from truenorth.records import ImuRecord
@@ -113,6 +113,18 @@ def test_stamps_of_milliseconds_make_no_gaps():
     log = Log("increments")
     log.add(rows)
     assert bridged(rows[1:], rows[0], np.empty(0), 0.002, log, begins=False)[1:] == ([], [])
+
+
+def test_a_gap_that_an_answer_goes_across_is_one_that_the_loop_bridges():
+    """Both go by the same interval: of stamps of milliseconds the rows' own pace is another one."""
+    time = np.round(0.0025 * np.arange(1.0, 4001.0) + 0.0004, 3)
+    time[3990:] += 1.0029 - (time[3990] - time[3989])
+    rows = np.hstack([time[:, None], np.zeros((4000, 6))])
+    log = Log("increments")
+    log.add(rows)
+    assert len(unbroken(rows[1:], rows[0], 0.003, begins=False)) == 3999
+    _, _, gaps = bridged(rows[1:], rows[0], np.empty(0), 0.003, log, begins=False)
+    assert len(gaps) == 1
 
 
 @pytest.mark.parametrize("after", [3000, 3001, 3002, 3003])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import effect_of, last_sizes, likelihood_ratio, rival
-from truenorth.quality.spikes import spikes_of
+from truenorth.quality.spikes import rows_held, spikes_of
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.judge import weight
@@ -31,10 +31,7 @@ def without_spikes(record: ImuRecord) -> tuple[ImuRecord, int]:
 
     A row of increments that holds a gap as well is as long as that: its mean rate is compared.
     """
-    rows = np.ones(len(record))
-    if record.kind == "increments":
-        gaps = record.gaps[record.gaps > 0]
-        rows[gaps] = record.steps[gaps] / record.interval
+    rows = rows_held(record)
     gyro, accel = ([_mended(x, rows, record.interval) for x in sensor.T] for sensor in (record.gyro, record.accel))
     count = sum(number for _, number in (*gyro, *accel))
     if count == 0:

@@ -42,9 +42,8 @@ def columns_of(path: Path, format: str, named: bool = True, part: str = "imu") -
             if labelled
             else "the dialect in which most lines are rows of numbers"
         )
-        column = lru_cache(maxsize=2)(
-            table.column
-        )  # a clock is asked for more than once, and each time is a pass over the text
+        # A clock is asked for more than once, and each time is a pass over the text.
+        column = lru_cache(maxsize=2)(table.column)
         return Columns(path, table.names, table.read, column, table.place, table.named, notes, why, table.above)
     if format == "sensor-folder":
         from truenorth.formats import sensor_folder

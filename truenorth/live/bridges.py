@@ -10,7 +10,7 @@ from truenorth.core.errors import DataError
 from truenorth.estimate.gaps import LONGEST_BRIDGE
 from truenorth.live.log import Log
 from truenorth.records.base import GAP_FACTOR
-from truenorth.strapdown.increments import ImuRows
+from truenorth.strapdown.increments import ImuRows, lost_between
 
 Array = NDArray[np.float64]
 Gap = tuple[float, float]  # s: the row before it, its length
@@ -59,7 +59,7 @@ def bridged(
     if not at.size:
         return _samples(rows, log), [], []
     missing = steps[at] - pace
-    if missing.max() > LONGEST_BRIDGE:
+    if (steps[at] - interval).max() > LONGEST_BRIDGE:  # as in :func:`unbroken`
         raise DataError(
             f"a gap of {steps[at].max():.3f} s in the rows of the IMU; expected {LONGEST_BRIDGE:g} s at most: what the "
             "vehicle did in it is not known; align again"
@@ -68,10 +68,8 @@ def bridged(
     before = np.vstack([last[None], rows[:-1]])[at, 1:]
     across = rows[at, 1:] - before
     if log.source_kind == "increments":
-        lost = (steps[at] / pace - 1.0)[:, None]
-        found = rows.copy()
-        found[at, 1:] += 0.5 * lost * (rows[at, 1:] + before)
-        rows = found
+        rows = rows.copy()
+        rows[at, 1:] += lost_between(before, rows[at, 1:], steps[at] / pace - 1.0)
         across /= pace[:, None]
     unrest = np.array([_unrest(log, float(time[row]), step) for row, step in zip(at, across)])
     turn, push = missing * unrest.T

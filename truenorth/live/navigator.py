@@ -121,9 +121,8 @@ class Navigator:
         self._setting: Setting | None = None
         self._state: LoopState | None = None
         self._interval = 0.0
-        self._last = np.full(
-            7, self.start.time
-        )  # the row that the loop took last, as it came; of the start its time alone counts
+        # The row that the loop took last, as it came; of the start its time alone counts.
+        self._last = np.full(7, self.start.time)
         self._sent: dict[str, dict[str, float]] = {key: {} for key in self.feeds}
         self._gaps: list[tuple[float, float]] = []
         self._noise = NoiseSeen(self.spec, kind)

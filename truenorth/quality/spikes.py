@@ -121,6 +121,15 @@ def _last_stretch(count: int, rows: int) -> int:
     return max((count - rows // 2 - 1) // rows, 0) * rows
 
 
+def rows_held(record: ImuRecord) -> Array:
+    """(N,) how many rows a value holds: one of increments that is as long as the rows lost before it is no spike."""
+    held = np.ones(len(record))
+    if record.kind == "increments":
+        gaps = record.gaps[record.gaps > 0]
+        held[gaps] = record.steps[gaps] / record.interval
+    return held
+
+
 def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
     """Channels of a base at rest whose single rows to one side are errors, and what that does to heading and level.
 
@@ -131,13 +140,11 @@ def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
     """
     counted = record.kind == "increments"
     unit = 1.0 / record.interval if counted else 1.0
-    share = np.ones(len(record))
-    if counted:  # a row that is as long as those that were lost before it is no spike
-        share[record.gaps] = record.interval / record.steps[record.gaps]
+    held = rows_held(record)
     found = []
     for channel, name in enumerate(COLUMNS[record.kind]):
         sensor = record.gyro if channel < 3 else record.accel
-        spikes = one_sided(sensor[:, channel % 3] * share, record.interval)
+        spikes = one_sided(sensor[:, channel % 3] / held, record.interval)
         if spikes is None:
             continue
         size = abs(spikes.mean) * unit

@@ -101,11 +101,16 @@ def across_gaps(record: ImuRecord) -> ImuRecord:
     gaps = record.gaps[record.gaps > 0]
     if record.kind == "rates" or not gaps.size:
         return record
-    lost = (record.steps[gaps] / record.interval - 1.0)[:, None]
+    lost = record.steps[gaps] / record.interval - 1.0
     gyro, accel = record.gyro.copy(), record.accel.copy()
     for out, x in ((gyro, record.gyro), (accel, record.accel)):
-        out[gaps] += 0.5 * lost * (x[gaps] + x[gaps - 1])
+        out[gaps] += lost_between(x[gaps - 1], x[gaps], lost)
     return replace(record, gyro=gyro, accel=accel)
+
+
+def lost_between(before: Array, after: Array, lost: Array) -> Array:
+    """Increments (m, n) of `lost` (m,) rows, between the rows next to a gap: rates change evenly there."""
+    return 0.5 * lost[:, None] * (after + before)
 
 
 def without_gaps(record: ImuRecord) -> ImuRecord:
