@@ -190,7 +190,7 @@ def rocks_on_an_arm(height, frequencies=(0.22, 0.4, 0.55)):
     return ImuRecord(time, gyro, accel)
 
 
-@pytest.mark.parametrize("height", [2.5, 5.0, -8.0])
+@pytest.mark.parametrize("height", some([2.5], [5.0, -8.0]))
 def test_an_arm_is_no_unit_of_the_gyros_nor_are_axes_wrong(height):
     record = rocks_on_an_arm(height)
     found = inspect(record)
