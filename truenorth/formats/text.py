@@ -116,7 +116,7 @@ class TextTable:
     def _remarks(self) -> bool:
         """Whether remarks stand among the rows."""
         return (
-            any(mark in self._rows for mark in REMARKS_BYTES)
+            any(mark[:1] in self._rows and mark in self._rows for mark in REMARKS_BYTES)  # one byte is found at once
             and re.search(rb"(?m)^[ \t]*(?:#|%|//)", self._rows) is not None
         )
 
