@@ -200,7 +200,8 @@ def _at_rest_part(data: Array, interval: float) -> Array:
     if cells < 5:
         return data
     rates = data[: cells * rows, :3].reshape(cells, rows, 3)
-    mean, spread = means_of(rates), np.linalg.norm(rates.std(axis=1), axis=1)
+    mean = means_of(rates)
+    spread = np.linalg.norm(np.sqrt(means_of((rates - mean[:, None]) ** 2)), axis=1)
     alive = spread[spread > 0.0]
     if not alive.size or not np.quantile(alive, 0.9) > RESTS * (quiet := np.quantile(alive, 0.1)):
         return data
