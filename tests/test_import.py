@@ -39,6 +39,13 @@ def test_an_alignment_of_a_base_that_stays_is_loaded_without_what_it_seldom_asks
     assert run(code).splitlines()[-1] == "[]"
 
 
+def test_a_base_alone_loads_nothing_of_aids():
+    """Neither their records, nor their readers, nor what they measure: each start of `align` would wait for them."""
+    code = "import truenorth.alignment.procedure, truenorth.alignment.recipes, truenorth.formats, sys"
+    others = ("aiding.aids", "records.gnss", "records.poses", "formats.aiding", "state.track", "alignment.published")
+    assert run(f"{code}\nprint([m for m in {others} if f'truenorth.{{m}}' in sys.modules])").splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize("what", ["the package", "its help"])
 def test_it_starts_within_its_budget(what):
     """The best of five at most, by the processor's time: what else a machine does is not counted."""

@@ -13,8 +13,8 @@ from truenorth.alignment.by_heave import columns, excluded, scaled, weighed_by_h
 from truenorth.alignment.heave import MOST, Heave, slepian
 from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
-from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import gyros_behind
 from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
 from truenorth.state.evidence import Effect, Evidence

@@ -5,8 +5,8 @@ import pytest
 
 from truenorth.alignment.late_gyros import turned_by
 from truenorth.campaign.fault_benches import BENCHES, misses
-from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import gyros_behind
 
 
 @pytest.mark.parametrize(("run", "late"), [(1, 0.01), pytest.param(3, 0.02, marks=pytest.mark.slow)])

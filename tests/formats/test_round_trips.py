@@ -80,7 +80,7 @@ def test_a_failure_while_writing_leaves_no_half_file(suffix, before, tmp_path, m
         file.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(f"truenorth.formats.{ {'.csv': 'text', '.npz': 'npz'}.get(suffix, 'parquet') }.write", half)
+    monkeypatch.setattr(f"truenorth.formats.{ {'.csv': 'csv_out', '.npz': 'npz'}.get(suffix, 'parquet') }.write", half)
     with pytest.raises(KeyboardInterrupt):
         write_imu(record_of(np.ones((2, 6))), path)
     assert [file.name for file in tmp_path.iterdir()] == ([] if before is None else [path.name])
@@ -93,7 +93,7 @@ def test_a_killed_writer_leaves_what_stood_there(tmp_path):
     path.write_bytes(b"what stood here")
     program = (
         "import sys, time, numpy as np\n"
-        "import truenorth.formats.text as csv\n"
+        "import truenorth.formats.csv_out as csv\n"
         "from truenorth import ImuRecord, write_imu\n"
         "def half(record, file):\n"
         "    file.write_bytes(b'half')\n"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth.quality.codes import codes_evidence, piled_up
+from truenorth.quality.codes import _most_alike, codes_evidence, piled_up
 from truenorth.records import ImuRecord
 
 ROWS = 6000
@@ -78,3 +78,15 @@ def test_a_short_channel_has_no_pile():
     """Of 10 to 13 rows two slices of another length were compared."""
     for rows in range(1, 20):
         assert piled_up(np.arange(rows) % 3.0) is None
+
+
+@pytest.mark.parametrize("zero", [0.0, -0.0])
+def test_rows_of_one_value_are_never_missed(zero):
+    """The quick count is no less than the rows of the most frequent value, be it a zero of either sign."""
+    rng = np.random.default_rng(4)
+    values = rng.standard_normal(200_000)
+    assert _most_alike(values) < 15
+    for value in (0.3, zero):
+        values[rng.choice(len(values), 40, replace=False)] = np.where(np.arange(40) % 2, value, abs(value))
+        assert _most_alike(values) >= 40
+    assert _most_alike(np.round(values)) >= np.unique(np.round(values), return_counts=True)[1].max()

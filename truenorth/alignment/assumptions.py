@@ -1,4 +1,4 @@
-"""What each published filter assumes of the base, the vehicle and the noise: said with every answer that it gives.
+"""The published filters, and what each assumes of the base, the vehicle and the noise: said with every answer that it gives.
 
 Sources: as :mod:`truenorth.alignment.published` and :mod:`truenorth.alignment.azimuth` have them.
 """
@@ -6,9 +6,18 @@ Sources: as :mod:`truenorth.alignment.published` and :mod:`truenorth.alignment.a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import TYPE_CHECKING, Literal, NoReturn
 
 from truenorth.core.errors import UsageError
+
+if TYPE_CHECKING:
+    from truenorth.filters.fading import Fading
+
+Published = Literal["kf", "sakf", "makf", "imakf", "states10", "states8"]
+
+# Kind of fading of each; SAKF of the paper's introduction corrects the measurement noise.
+FADING: dict[str, Fading | None] = {"kf": None, "sakf": "noise", "makf": "multiple", "imakf": "improved"}
+STATIONARY = {"states10": 10, "states8": 8}
 
 BASE = "what the base moves is white noise of one size"
 LEVEL = "a still base and a level IMU"

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.heave import Delay, Heave
 from truenorth.alignment.late_gyros import turned_by
-from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import gyros_behind
 from truenorth.state.evidence import Effect, Evidence, Kind
 from truenorth.state.limits import limit, may_be_chance
 

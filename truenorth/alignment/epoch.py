@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
-from truenorth.strapdown.level import increments
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 

@@ -29,7 +29,7 @@ from truenorth.quality.own_velocity import own_velocity
 from truenorth.records.specs import ImuSpec
 from truenorth.state.limits import limit
 from truenorth.strapdown.increments import increments
-from truenorth.strapdown.level import inertial_integrals
+from truenorth.strapdown.inertial_integration import inertial_integrals
 
 Array = NDArray[np.float64]
 

@@ -37,8 +37,8 @@ from numpy.typing import NDArray
 
 from truenorth.core.position import Position
 from truenorth.errors.staying import local_axes, mean_velocity
-from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import gyros_behind
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]

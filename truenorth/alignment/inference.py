@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.usual import CORRELATION_TIME, usual
 from truenorth.errors.staying import StaticModel
-from truenorth.quality.noise import noise_coefficients
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 
@@ -129,5 +128,7 @@ def usual_noise() -> StaticModel:
 
 def allan_noise(record: ImuRecord) -> StaticModel:
     """Random walks of a base at rest by the Allan deviation (worst axis)."""
+    from truenorth.quality.noise import noise_coefficients
+
     gyro, accel = noise_coefficients(record)
     return StaticModel(float(np.max(gyro.random_walk)), float(np.max(accel.random_walk)))

@@ -25,8 +25,8 @@ from truenorth.alignment.put_right import Anew, in_step, likelihood
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.core.attitude import misalignment
 from truenorth.estimate.responses import Seen, likeliest
-from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import gyros_behind
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 

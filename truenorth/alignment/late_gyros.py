@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import innovations_of
 from truenorth.estimate.responses import Seen, likeliest
-from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.estimate.staying import StayingLog
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import gyros_behind
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.against import against
 from truenorth.alignment.answer import answer_of, at_epoch, without_heading
-from truenorth.alignment.assumptions import STAYING, reason, refuse
+from truenorth.alignment.assumptions import FADING, STATIONARY, STAYING, Published, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
 from truenorth.alignment.brief_sway import bent_by_heading, may_swing_on_lines
@@ -30,7 +30,6 @@ from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, spe
 from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.listing import LISTS, as_listing
-from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
@@ -310,6 +309,8 @@ def _align_inertial(
     model, shared = StaticModel.of(used), cell is not None
     start = CoarseStart(task.record, coarse.C_n0_i, task.position, model, P, task.interval, rows, shares=shared)
     if method in FADING:
+        from truenorth.alignment.published import factor_share, faded_align
+
         fine = faded_align(start, method)
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
@@ -362,6 +363,8 @@ def _align_inertial(
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:
     """The answer of a published filter of ten or eight states."""
+    from truenorth.alignment.published import stationary_align
+
     found = stationary_align(task, C_n0_i, StaticModel.of(used), P, method)
     answer = at_epoch(task, used, where, found.C_n0_b, found.covariance, found.floor)
     known = ~np.isnan(found.bias[3:])

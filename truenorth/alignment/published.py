@@ -27,11 +27,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.assumptions import FADING, STATIONARY
 from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import dcm_from_rotation_vector
@@ -43,7 +44,6 @@ from truenorth.estimate.base_motion import QUIETEST_BASE, white_variance
 from truenorth.estimate.batch import ROUGHLY, Filtered, in_sigmas, settle
 from truenorth.estimate.staying import HEADING_PRIOR, LEVEL_PRIOR, VELOCITY_PRIOR, StayingLog, prior_of
 from truenorth.filters import Estimates, LinearSystem, fading, filter_gains, kalman
-from truenorth.filters.fading import Fading
 from truenorth.filters.gains import initial_part
 from truenorth.records import ImuRecord
 from truenorth.state.state import State
@@ -51,11 +51,6 @@ from truenorth.strapdown.inertial import earth_rotation, integrate
 from truenorth.strapdown.level import mechanise
 
 Array = NDArray[np.float64]
-Published = Literal["kf", "sakf", "makf", "imakf", "states10", "states8"]
-
-# Kind of fading of each; SAKF of the paper's introduction corrects the measurement noise.
-FADING: dict[str, Fading | None] = {"kf": None, "sakf": "noise", "makf": "multiple", "imakf": "improved"}
-STATIONARY = {"states10": 10, "states8": 8}
 PASSES = 3
 BIASES = slice(stationary.BG.start, stationary.BA.stop)
 LEVEL_IMU = math.radians(5.0)  # a tilt up to which the two level accelerometers are those of the model

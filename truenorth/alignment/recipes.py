@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from truenorth.aiding.aids import Barometer, Gnss, Indexer, Master, Odometer, Positions, VelocityLog
+import truenorth.aiding as aiding
 from truenorth.alignment.result import Alignment
 from truenorth.core.attitude import euler_from_dcm
 from truenorth.core.errors import AlignmentError, UsageError
@@ -99,8 +99,7 @@ MEANT = {
     "odometer": "aid=Odometer(record)",
     "velocity": "aid=VelocityLog(record)",
     "master": "aid=Master(record)",
-    "encoder": "aid=Indexer(record)",
-    "indexer": "aid=Indexer(record)",
+    **dict.fromkeys(("encoder", "indexer"), "aid=Indexer(record)"),
 }
 
 
@@ -112,7 +111,7 @@ class Recipe:
     ----------
     name : str
     run : function or "module:name"
-    aids : tuple of types
+    aids : tuple of types, or of names in :mod:`truenorth.aiding`
         One at least of these is given, and no other; empty: none is given.
     methods : bool
         Whether a method can be asked for; the recipe checks its name.
@@ -124,7 +123,7 @@ class Recipe:
 
     name: str
     run: Run | str
-    aids: tuple[type, ...] = ()
+    aids: tuple[type | str, ...] = ()
     methods: bool = False
     at: bool = False
     own: bool = False
@@ -132,7 +131,12 @@ class Recipe:
     def fits(self, kinds: set[type]) -> bool:
         """Whether it takes aids of these types."""
         kinds = {kind for kind in kinds if not (self.own and _further(kind))}
-        return kinds <= set(self.aids) if kinds else not self.aids
+        return kinds <= set(self.kinds) if kinds else not self.aids
+
+    @property
+    def kinds(self) -> tuple[type, ...]:
+        """The types of the aids: those that are given by name are loaded where it is asked for them."""
+        return tuple(getattr(aiding, aid) if isinstance(aid, str) else aid for aid in self.aids)
 
     def __call__(self, request: Request) -> Alignment:
         """Align."""
@@ -145,7 +149,7 @@ class Recipe:
 
 def _further(kind: type) -> bool:
     """Whether aids of this type bring their measurements themselves: sensors of attitude, or of a user's own module."""
-    return hasattr(kind, "sources") and kind not in (Gnss, Odometer, VelocityLog, Barometer)
+    return hasattr(kind, "sources") and kind not in (aiding.Gnss, aiding.Odometer, aiding.VelocityLog, aiding.Barometer)
 
 
 def on_base(r: Request) -> Alignment:
@@ -162,7 +166,7 @@ def in_motion(r: Request) -> Alignment:
     from truenorth.errors.log import LogErrors, log_errors
     from truenorth.estimate.own_clock import on_its_clock
 
-    odometer, log, gnss = r.aids.get(Odometer), r.aids.get(VelocityLog), r.aids.get(Gnss)
+    odometer, log, gnss = r.aids.get(aiding.Odometer), r.aids.get(aiding.VelocityLog), r.aids.get(aiding.Gnss)
     wheel = odometer or log
     if r.imu is None:
         raise UsageError(
@@ -192,7 +196,7 @@ def by_master(r: Request) -> Alignment:
     """Against a master INS on the same vehicle."""
     from truenorth.alignment.transfer import ON_MASTER, align_transfer
 
-    master = r.aids[Master]
+    master = r.aids[aiding.Master]
     m = master.mounting or ON_MASTER
     return align_transfer(
         r.record,
@@ -222,7 +226,7 @@ def on_indexer(r: Request) -> Alignment:
     """An IMU that turns on an indexer."""
     from truenorth.alignment.rotary import align_rotary
 
-    indexer = r.aids[Indexer]
+    indexer = r.aids[aiding.Indexer]
     return align_rotary(
         r.record if r.calibration is None else r.calibration.apply(r.record),
         indexer.record,
@@ -242,7 +246,7 @@ def on_table(r: Request) -> Alignment:
     """Positions of a turntable."""
     from truenorth.alignment.positions import align_positions
 
-    positions = r.aids[Positions]
+    positions = r.aids[aiding.Positions]
     return align_positions(
         r.record, r.needed_place(), r.imu, calibration=r.calibration, arm_sigma=positions.arm_sigma, **r.common
     )
@@ -250,13 +254,11 @@ def on_table(r: Request) -> Alignment:
 
 RECIPES = [
     Recipe("a base that stays", on_base, methods=True, at=True),
-    Recipe("a vehicle on the move", in_motion, (Odometer, VelocityLog, Gnss), methods=True, own=True),
-    Recipe("a master INS", by_master, (Master,)),
-    Recipe("an IMU on an indexer", on_indexer, (Indexer,), methods=True, at=True),
-    Recipe("a turntable", on_table, (Positions,)),
+    Recipe("a vehicle on the move", in_motion, ("Odometer", "VelocityLog", "Gnss"), methods=True, own=True),
+    Recipe("a master INS", by_master, ("Master",)),
+    Recipe("an IMU on an indexer", on_indexer, ("Indexer",), methods=True, at=True),
+    Recipe("a turntable", on_table, ("Positions",)),
 ]
-
-
 LIBRARY = tuple(RECIPES)  # those that infer what is not said of an IMU from its log
 
 
@@ -337,7 +339,7 @@ def align(
         from truenorth.alignment.unsaid import completed
 
         own = callable(method) or method in plugins("truenorth.methods") or _fitting(set(aids)) not in LIBRARY
-        imu, unsaid = completed(said, log, stays=not own and aids.keys() <= {Indexer, Positions})
+        imu, unsaid = completed(said, log, stays=not own and aids.keys() <= {aiding.Indexer, aiding.Positions})
     request = Request(
         log,
         None if place is None else Position.of(place),
@@ -365,10 +367,8 @@ def align(
         answer = recipe(request)
         return replace(answer, evidence=(*answer.evidence, *unsaid)) if unsaid else answer
     except TypeError as error:
-        refused = (
-            "unexpected keyword argument", "multiple values for argument", "multiple values for keyword argument",
-        )  # fmt: skip
-        wrong = next((name for name in options if any(f"{said} '{name}'" in str(error) for said in refused)), None)
+        texts = ("unexpected keyword argument", "multiple values for argument", "multiple values for keyword argument")
+        wrong = next((name for name in options if any(f"{said} '{name}'" in str(error) for said in texts)), None)
         if wrong is None:
             raise
         raise _no_option(wrong, recipe.name) from None
@@ -387,7 +387,7 @@ def _fitting(kinds: set[type]) -> Recipe | None:
 def _recipe(kinds: set[type]) -> Recipe:
     found = _fitting(kinds)
     if found is None:
-        sets = "; ".join(f"{' and/or '.join(k.__name__ for k in r.aids)} ({r.name})" for r in RECIPES if r.aids)
+        sets = "; ".join(f"{' and/or '.join(k.__name__ for k in r.kinds)} ({r.name})" for r in RECIPES if r.aids)
         names = ", ".join(sorted(kind.__name__ for kind in kinds))
         raise UsageError(f"aid: no recipe takes {names} together; expected one of: {sets}")
     return found

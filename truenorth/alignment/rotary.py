@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.alignment.accel_scale import accel_scale_evidence
 from truenorth.alignment.answer import answer_of
-from truenorth.alignment.assumptions import reason, refuse
+from truenorth.alignment.assumptions import FADING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.coarse_sensors import calibrated, matrix_evidence, shown_biases
 from truenorth.alignment.encoder_angles import CarriedAngles, angles_at, carried_angles
@@ -32,7 +32,7 @@ from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
 from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT
-from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
+from truenorth.alignment.published import factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.put_right import aligned_anew
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rivals import rival_evidence

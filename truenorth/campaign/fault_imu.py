@@ -15,8 +15,8 @@ from truenorth.campaign.fault import Fault, Inputs, Rng, clock_rate, either, of_
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import METRES_PER_RADIAN
-from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
+from truenorth.records.interpolation import gyros_behind
 
 Array = NDArray[np.float64]
 

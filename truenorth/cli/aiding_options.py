@@ -108,11 +108,11 @@ class Turntable:
 
     def aids(self) -> list[Any]:
         """Positions, where a turntable is named."""
+        if self.positions is None:
+            return []
         from truenorth.aiding.aids import Positions
         from truenorth.core.errors import UsageError
 
-        if self.positions is None:
-            return []
         if self.positions != "auto":
             raise UsageError(f"--positions {self.positions!r}; expected auto: turns and positions are found in the log")
         return [Positions(**given(self, "positions"))]
@@ -140,11 +140,11 @@ class OnIndexer:
 
     def aids(self) -> list[Any]:
         """The indexer, where one is named."""
+        if self.indexer is None:
+            return []
         from truenorth.aiding.aids import Indexer
         from truenorth.formats import read_encoder
 
-        if self.indexer is None:
-            return []
         return [Indexer(None if self.indexer == GYROS else read_encoder(self.indexer), **given(self, "indexer"))]
 
 

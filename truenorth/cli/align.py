@@ -95,7 +95,6 @@ def align(
     from truenorth.alignment import align as align_record
     from truenorth.core.atomic import writable_folder
     from truenorth.core.errors import UsageError
-    from truenorth.quality import inspect
     from truenorth.records.calibration import Calibration
 
     place = where.position()
@@ -138,6 +137,8 @@ def align(
             **({"errors": moving.error} if moving.error else {}),
         )
         if output is not None:
+            from truenorth.quality import inspect
+
             tell("inspecting the log")
             result = replace(result, inspection=inspect(record, result.position.lat))
             tell("writing the report")

@@ -213,6 +213,11 @@ def _of_runtime() -> dict[str, int]:
 
 def _protect(address: int, size: int, access: int) -> int:
     """Change what may be done with memory; 0 where that was possible."""
+    return int(_mprotect()(address, size, access))
+
+
+@cache
+def _mprotect() -> Any:
     function = ctypes.CDLL(None).mprotect
     function.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
-    return int(function(address, size, access))
+    return function

@@ -7,7 +7,6 @@ A result is data and imports neither figures nor reports. Who draws and writes e
 from __future__ import annotations
 
 import base64
-import html
 import io
 import sys
 from collections.abc import Callable, Mapping
@@ -266,6 +265,8 @@ class Shown:
         return self._picture
 
     def _repr_html_(self) -> str:
+        import html  # in notebooks alone
+
         rows = "".join(
             f"<tr><th style='text-align:left'>{html.escape(key)}</th><td style='text-align:left'>{html.escape(text)}</td></tr>"
             for key, text in self.in_brief().items()

@@ -77,12 +77,8 @@ def fit_turning(interval: float, rates: Array) -> Turning:
     middle = np.where(good, 0.5 * (up[:, 1:] + up[:, :-1]), 0.0)
 
     # Turn if axis i holds column j, for all i and j: each reading is a sum of three of the nine.
-    basis = np.stack(
-        [
-            [_smooth(-np.cross(np.eye(3)[i], middle, axisb=0, axisc=0) * theta[j], cells).ravel() for j in range(3)]
-            for i in range(3)
-        ]
-    )
+    turned = [-np.cross(axis, middle, axisb=0, axisc=0) for axis in np.eye(3)]
+    basis = np.stack([[_smooth(about * theta[j], cells).ravel() for j in range(3)] for about in turned])
     products = np.einsum("ijn,kln->ijkl", basis, basis)
     overlaps, total = basis @ turn.ravel(), float(np.sum(turn**2))
     readings = []
@@ -137,10 +133,11 @@ def _fitted(columns: Array, values: Array) -> Array:
 
 def _smooth(signal: Array, cells: int) -> Array:
     """(3, m) means over `cells`, taken twice, of every `cells`-th column."""
-    for _ in range(2):
-        total = np.cumsum(np.pad(signal, ((0, 0), (1, 0))), axis=1)
-        signal = (total[:, cells:] - total[:, :-cells]) / cells
-    return signal[:, ::cells]
+    for step in (1, cells):
+        total = np.zeros((len(signal), signal.shape[1] + 1))
+        np.cumsum(signal, axis=1, out=total[:, 1:])
+        signal = (total[:, cells::step] - total[:, :-cells:step]) / cells
+    return signal
 
 
 def _columns(order: tuple[int, ...], signs: tuple[float, ...]) -> str:

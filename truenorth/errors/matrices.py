@@ -20,8 +20,9 @@ from truenorth.core.remembered import remembered
 from truenorth.errors.staying import DV, PHI, grown, local_axes
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
+from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_velocity
-from truenorth.strapdown.level import increments, inertial_integrals
+from truenorth.strapdown.inertial_integration import inertial_integrals
 
 Array = NDArray[np.float64]
 

@@ -14,13 +14,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors.model import InsModel
 from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, STATES
 from truenorth.state.prior import WholeBiases
+
+if TYPE_CHECKING:
+    from truenorth.errors.model import InsModel
 
 Array = NDArray[np.float64]
 

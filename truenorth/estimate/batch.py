@@ -10,14 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.filters import Estimates, LinearSystem
 from truenorth.state.layout import PHI
-from truenorth.state.track import Track
+
+if TYPE_CHECKING:
+    from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ systems", IEEE Trans. Autom. Control 21 (1976); signatures by passes of the filt
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,10 @@ from numpy.typing import NDArray
 from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.quality.led_away import no_outlier
 from truenorth.quality.whiteness import whiteness
-from truenorth.records import GnssRecord
-from truenorth.state.track import Residuals, Track
+
+if TYPE_CHECKING:
+    from truenorth.records import GnssRecord
+    from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 

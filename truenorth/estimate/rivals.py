@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,10 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, Kind
 from truenorth.state.layout import DP, DV
 from truenorth.state.limits import limit, may_be_chance
-from truenorth.state.track import Residuals, Track
 from truenorth.strapdown.increments import without_gaps
+
+if TYPE_CHECKING:
+    from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 

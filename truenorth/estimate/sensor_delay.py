@@ -26,7 +26,6 @@ from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import likelihood_ratio, moved, rival
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import ImuRecord
-from truenorth.records.interpolation import held_at_ends
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
@@ -137,11 +136,6 @@ def gyros_later(record: ImuRecord, rows: int) -> ImuRecord:
     """The record with its gyros so many rows later; where there are none the nearest are held."""
     at = np.clip(np.arange(len(record)) - rows, 0, len(record) - 1)
     return replace(record, gyro=record.gyro[at])
-
-
-def gyros_behind(record: ImuRecord, late: float) -> ImuRecord:
-    """The record with its gyros late by so many seconds, parts of a row too."""
-    return replace(record, gyro=held_at_ends(record.time, record.gyro, record.time - late))
 
 
 def _peak(ratios: dict[int, float], best: int) -> int:

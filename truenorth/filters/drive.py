@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal, TypedDict, TypeVar, get_args
 
 import numpy as np
@@ -143,6 +142,8 @@ def in_parts(count: int, workers: int, call: Callable[[int, int], None]) -> None
         call(0, count)
         return
     edges = np.linspace(0, count, min(workers, count) + 1).astype(int)
+    from concurrent.futures import ThreadPoolExecutor  # many runs at once are rare, and it loads much
+
     with ThreadPoolExecutor(len(edges) - 1) as pool:
         list(pool.map(call, edges[:-1], edges[1:]))
 

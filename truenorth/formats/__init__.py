@@ -7,27 +7,25 @@ from dataclasses import replace
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from truenorth.core.lazy import lazy
 from truenorth.core.paths import as_path, unreadable
 from truenorth.core.plugins import plugin, plugins
 from truenorth.formats import devices
-from truenorth.formats.aiding import (
-    read_encoder,
-    read_height,
-    read_odometer,
-    read_velocity,
-)
 from truenorth.formats.detect import FORMATS, SUFFIXES, format_of
-from truenorth.formats.gnss import read_gnss
 from truenorth.formats.guesses import UnsureError, write_layout
 from truenorth.formats.layout import Layout, layout_for
 from truenorth.formats.opening import columns_of
-from truenorth.formats.poses import read_master, read_trajectory
 from truenorth.formats.table import record_of
-from truenorth.formats.writing import write_imu, write_record
 from truenorth.formats.zipped import unpacked
 from truenorth.records import ImuRecord
+
+if TYPE_CHECKING:
+    from truenorth.formats.aiding import read_encoder, read_height, read_odometer, read_velocity
+    from truenorth.formats.gnss import read_gnss
+    from truenorth.formats.poses import read_master, read_trajectory
+    from truenorth.formats.writing import write_imu, write_record
 
 __all__ = [
     "FORMATS",
@@ -44,6 +42,27 @@ __all__ = [
     "write_layout",
     "write_record",
 ]
+
+# An IMU's log alone is read without the readers of all that may aid it.
+__getattr__, _ = lazy(
+    __name__,
+    {
+        "read_encoder": "aiding",
+        "read_gnss": "gnss",
+        "read_height": "aiding",
+        "read_master": "poses",
+        "read_odometer": "aiding",
+        "read_trajectory": "poses",
+        "read_velocity": "aiding",
+        "write_imu": "writing",
+        "write_record": "writing",
+    },
+)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
 
 READERS = {
     "mat": ("mat", "read"),

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import means_of
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.turning import AGREES, Turning, fit_turning
 from truenorth.core.units import STANDARD_GRAVITY as G
@@ -153,7 +154,7 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     data = np.hstack([gyro, accel])[: cells * rows]
     if kind == "increments":
         data = data / interval
-    rates = data.reshape(cells, rows, 6).mean(axis=1).T if cells else np.zeros((6, 0))
+    rates = means_of(data.reshape(cells, rows, 6)).T if cells else np.zeros((6, 0))
     turning = fit_turning(rows * interval, np.ascontiguousarray(rates))
     largest = float(np.quantile(np.abs(data[:, :3]), 0.999)) if len(data) else 0.0
     data = _at_rest_part(data, interval)
@@ -177,7 +178,7 @@ def are_angles(time: Array, gyro: Array, accel: Array, as_rates: float) -> bool:
     cells = len(time) // rows
     if cells < 3:
         return False
-    means = np.hstack([gyro, accel])[: cells * rows].reshape(cells, rows, 6).mean(axis=1)
+    means = means_of(np.hstack([gyro, accel])[: cells * rows].reshape(cells, rows, 6))
     change = np.gradient(means[:, :3], rows * interval, axis=0)
     found = fit_turning(rows * interval, np.ascontiguousarray(np.hstack([change, means[:, 3:]]).T))
     if not found.best_scale > 0.0 or not found.best_agreement >= AGREES:
@@ -199,7 +200,8 @@ def _at_rest_part(data: Array, interval: float) -> Array:
     if cells < 5:
         return data
     rates = data[: cells * rows, :3].reshape(cells, rows, 3)
-    mean, spread = rates.mean(axis=1), np.linalg.norm(rates.std(axis=1), axis=1)
+    mean = means_of(rates)
+    spread = np.linalg.norm(np.sqrt(means_of((rates - mean[:, None]) ** 2)), axis=1)
     alive = spread[spread > 0.0]
     if not alive.size or not np.quantile(alive, 0.9) > RESTS * (quiet := np.quantile(alive, 0.1)):
         return data
@@ -223,7 +225,7 @@ def _random_walk(data: Array, interval: float) -> float:
         m = max(1, round(tau / interval))
         count = len(data) // m
         if count >= 8:
-            change = np.diff(data[: count * m].reshape(count, m, 3).mean(axis=1), axis=0)
+            change = np.diff(means_of(data[: count * m].reshape(count, m, 3)), axis=0)
             power, second = np.mean(change**2, axis=0), np.mean(np.diff(change, axis=0) ** 2, axis=0)
             walks.append(np.sqrt(0.5 * power * m * interval))
             rough.append(bool(np.median(second - ROUGH * power) > 0.0))

@@ -18,7 +18,6 @@ from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import BLOCKS, Layout
 from truenorth.formats.names import Heading, families, heading_of, plain, says_rates
 from truenorth.formats.units import split
-from truenorth.formats.unnamed import by_behaviour
 from truenorth.records import COLUMNS, Guess
 from truenorth.records.imu import Kind
 
@@ -55,6 +54,8 @@ def choose(columns: Columns, layout: Layout) -> Choice:
     if near:
         wanted = next(c for k in COLUMNS for c in COLUMNS[k] if near[0] in COLUMNS[k] and c not in columns.names)
         raise missing_column(columns, wanted, wanted)
+    from truenorth.formats.unnamed import by_behaviour  # most logs name their columns
+
     return by_behaviour(columns, layout)
 
 

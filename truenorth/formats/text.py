@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.formats.arrow import table_of, to_numpy
+from truenorth.formats.arrow import to_numpy
 from truenorth.formats.content import REMARKS_BYTES, first_piece, text_of
 from truenorth.formats.dialect import (
     DELIMITERS,
@@ -32,7 +32,6 @@ from truenorth.formats.dialect import (
 from truenorth.formats.labelled import table_of_labels
 from truenorth.formats.line_ends import without_ends_in_quotes
 from truenorth.formats.quotes import without_outer_quotes, without_stray_quotes
-from truenorth.records import Record
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -44,6 +43,7 @@ MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
 MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
+REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//)")
 SENTENCE = re.compile(r"\$?[A-Z]{5},.*\*[0-9A-F]{2}")
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
@@ -115,21 +115,24 @@ class TextTable:
     @cached_property
     def _remarks(self) -> bool:
         """Whether remarks stand among the rows."""
+        # One byte is found at once, two are not.
         return (
-            any(mark in self._rows for mark in REMARKS_BYTES)
-            and re.search(rb"(?m)^[ \t]*(?:#|%|//)", self._rows) is not None
+            any(self.text.find(mark[:1], self.begin) >= 0 and mark in self.text for mark in REMARKS_BYTES)
+            and REMARK.search(self.text, self.begin) is not None
         )
 
     @cached_property
-    def _rows(self) -> bytes:
-        """The text from the first row on."""
-        ends = [line.end() for line in islice(_lines(self.text), self.skip)]
-        return self.text[ends[-1] :] if ends else self.text
+    def begin(self) -> int:
+        """Where in the text the first row begins."""
+        return max((line.end() for line in islice(_lines(self.text), self.skip)), default=0)
 
     @cached_property
-    def _body(self) -> bytes:
-        """The rows as Arrow wants them."""
-        body = self._rows
+    def _body(self) -> bytes | memoryview:
+        """The rows as Arrow wants them; no copy where they are so: of a long log that takes longer than to look through it."""
+        ends = self.text.find(b"\n", self.begin) >= 0 or self.text.find(b"\r", self.begin) < 0
+        if ends and not self._remarks and self.dialect.delimiter is not None:
+            return memoryview(self.text)[self.begin :]
+        body = self.text[self.begin :]
         if self._remarks:
             body = re.sub(rb"(?m)^[ \t]*(?:#|%|//).*$", b"", body)
         if self.dialect.delimiter is None:
@@ -147,7 +150,7 @@ class TextTable:
         for k, name in enumerate(names):
             labels[self.names.index(name)] = str(k)
         wanted = [str(k) for k in range(len(names))]
-        if not self._body or self._body.isspace():
+        if re.search(rb"\S", self._body) is None:
             raise DataError(f"{self.path.name}: a header and no rows; expected numbers below it")
         table = pc.read_csv(
             pa.BufferReader(self._body),
@@ -184,16 +187,6 @@ class TextTable:
                     hint = mark if other else "a number: remove the line or repair the cell"
                     return DataError(f"{source}: line {number}, column {self.names[i]}: {cell!r}; expected {hint}")
         return None
-
-
-def write(record: Record, path: Path) -> None:
-    """Write a record as CSV with the documented columns; every number reads back to the same bits."""
-    import pyarrow.csv as pc
-
-    table = table_of(record)
-    with path.open("wb") as file:
-        file.write((",".join(table.column_names) + "\n").encode())
-        pc.write_csv(table, file, pc.WriteOptions(include_header=False))
 
 
 def open_table(path: Path) -> TextTable:
@@ -373,15 +366,22 @@ def _without_rows(path: Path, text: bytes, head: list[tuple[int, str]], notes: t
     return TextTable(path, text, names, True, Dialect(DELIMITERS[cells.index(names)], "."), number, line, (), notes)
 
 
+def _end_of(text: bytes, blanks: bytes) -> int:
+    """Where a text ends, but for blanks: without a copy of it."""
+    tail = text[-LONGEST_LINE:]
+    ended = tail.rstrip(blanks)
+    return len(text) - len(tail) + len(ended) if ended else len(text.rstrip(blanks))
+
+
 def without_a_cut_end(table: TextTable) -> TextTable:
     """Leave out a last line that a logger did not finish: too few cells, or no line end and a cell shorter than above."""
     blanks = b" \t" if table.dialect.delimiter != "\t" else b" "
-    text = table.text.rstrip(b"\r\n" + blanks)
-    start = max(text.rfind(b"\n"), text.rfind(b"\r")) + 1
-    if start <= len(table.text) - len(table._rows) or start < len(text) - LONGEST_LINE:
+    text, end = table.text, _end_of(table.text, b"\r\n" + blanks)
+    start = max(text.rfind(mark, max(0, end - LONGEST_LINE - 1), end) for mark in (b"\n", b"\r")) + 1
+    if start <= table.begin:
         return table  # the first row, which stays to be complained about
-    whole = len(text) < len(table.text.rstrip(blanks))
-    last = table.dialect.cells(text[start:].decode("latin-1"))
+    whole = end < _end_of(text, blanks)
+    last = table.dialect.cells(text[start:end].decode("latin-1"))
     count = len(table.names)
     if len(last) >= count:
         if whole or len(last) > count:
@@ -390,7 +390,7 @@ def without_a_cut_end(table: TextTable) -> TextTable:
         lengths = [len(cells[-1]) for cells in previous if len(cells) == count]
         if not lengths or len(last[-1]) >= min(lengths):
             return table
-    if last and text[start:].lstrip().startswith(REMARKS_BYTES):
+    if last and text[start:end].lstrip().startswith(REMARKS_BYTES):
         return table
     note = (
         f"the last line holds {len(last)} of {count} columns: cut, left out"

@@ -9,7 +9,7 @@ from pathlib import Path
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord, Record
 
-WRITERS = {".csv": "text", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
+WRITERS = {".csv": "csv_out", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
 
 
 def write_imu(record: ImuRecord, path: str | PathLike[str]) -> None:

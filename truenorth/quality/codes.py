@@ -28,6 +28,7 @@ LEAST = 30.0  # rows that the hole should have: none by chance in one of 10^13 o
 LEVELS = 10  # different values on either side, within the width of the hole: a hole of as many steps
 SPREAD = 6  # tenths of that width in which they lie: counts that were added up lie on few places, and differ in their last digits
 PART = 0.5  # of the rows that the hole should have, which must stand on the one value
+BINS = 1 << 16  # by the last digits of a value; of noise each gets a row in 65536
 
 
 class Pile(NamedTuple):
@@ -41,8 +42,11 @@ class Pile(NamedTuple):
 
 def piled_up(values: Array) -> Pile | None:
     """The value of a channel (N,) that has the rows of the largest hole; None where there is no such hole."""
-    least, ordered = math.ceil(PART * LEAST), np.sort(values)
-    if len(values) < least or not np.any(ordered[least - 1 :] == ordered[: len(ordered) - least + 1]):
+    least = math.ceil(PART * LEAST)
+    if _most_alike(values) < least:
+        return None
+    ordered = np.sort(values)
+    if not np.any(ordered[least - 1 :] == ordered[: len(ordered) - least + 1]):
         return None  # no value has so many rows
     levels, counts = np.unique(ordered, return_counts=True)
     if len(levels) < 2 * LEVELS + 1:
@@ -62,6 +66,12 @@ def piled_up(values: Array) -> Pile | None:
         if found is None or width > found.below + found.above:
             found = Pile(float(levels[k]), below, above, int(counts[k]))
     return found
+
+
+def _most_alike(values: Array) -> int:
+    """At least as many as the rows that the most frequent value has: a tenth of the time that sorting takes."""
+    bits = (values + 0.0).view(np.int64)  # of one zero, not of two
+    return int(np.bincount((bits ^ bits >> 16 ^ bits >> 32) & (BINS - 1), minlength=1).max())
 
 
 def _places(levels: Array, width: float) -> int:

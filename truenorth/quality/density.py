@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.blocks import row_blocks
+from truenorth.core.blocks import means_of, row_blocks
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
 from truenorth.quality.regimes import MotionSummary
@@ -32,7 +32,6 @@ FEWEST = 30  # differences in a stretch
 TAUS = (0.02, 0.1, 0.5, 1.0, 2.0, 5.0)  # s: of the Allan deviation of a sensor at rest
 
 
-@remembered
 def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
     """Edges (S+1,) of stretches, s, and the density (S, 6) of white noise in them, rad/sqrt(s) and m/s/sqrt(s).
 
@@ -42,6 +41,7 @@ def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
     return edges, density
 
 
+@remembered
 def _densities(record: ImuRecord) -> tuple[Array, Array, Array]:
     """The same, and how loud (S, 6) each stretch is, white or not."""
     dt = record.interval
@@ -55,7 +55,7 @@ def _densities(record: ImuRecord) -> tuple[Array, Array, Array]:
         if record.kind == "increments":
             data = data / dt
         for of_m, m in zip(density[:, part.start // rows : part.stop // rows], ROWS, strict=True):
-            cells = data[:, : rows // m * m].reshape(len(data), rows // m, m, 6).mean(axis=2)
+            cells = means_of(data[:, : rows // m * m].reshape(len(data), rows // m, m, 6))
             rough = np.diff(cells, n=ORDER, axis=1)
             of_m[:] = np.sqrt(np.mean(rough**2, axis=1) * m * dt / GAIN)
     low, high = density.min(axis=0), density.max(axis=0)

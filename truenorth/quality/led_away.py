@@ -16,7 +16,7 @@ systems", IEEE Trans. Autom. Control 21 (1976); the memory of the filter by a fe
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,9 @@ from truenorth.core.compiled import compiled
 from truenorth.quality.whiteness import FEWEST, whiteness
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit
-from truenorth.state.track import Residuals
+
+if TYPE_CHECKING:
+    from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
 

@@ -1,12 +1,17 @@
 """Records: measurements in SI units and our axes, checked when they are made."""
 
-from truenorth.records.base import GAP_FACTOR, IN_ORDER, Guess, Late, Record
-from truenorth.records.encoder import EncoderRecord
-from truenorth.records.gnss import GnssRecord, HeightRecord
-from truenorth.records.imu import COLUMNS, ImuRecord
-from truenorth.records.odometer import OdometerRecord
-from truenorth.records.poses import MasterRecord, Trajectory
-from truenorth.records.velocity import VelocityRecord
+from typing import TYPE_CHECKING
+
+from truenorth.core.lazy import lazy
+
+if TYPE_CHECKING:
+    from truenorth.records.base import GAP_FACTOR, IN_ORDER, Guess, Late, Record
+    from truenorth.records.encoder import EncoderRecord
+    from truenorth.records.gnss import GnssRecord, HeightRecord
+    from truenorth.records.imu import COLUMNS, ImuRecord
+    from truenorth.records.odometer import OdometerRecord
+    from truenorth.records.poses import MasterRecord, Trajectory
+    from truenorth.records.velocity import VelocityRecord
 
 __all__ = [
     "COLUMNS",
@@ -24,3 +29,23 @@ __all__ = [
     "Trajectory",
     "VelocityRecord",
 ]
+
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        "COLUMNS": "imu",
+        "EncoderRecord": "encoder",
+        "GAP_FACTOR": "base",
+        "GnssRecord": "gnss",
+        "Guess": "base",
+        "HeightRecord": "gnss",
+        "IN_ORDER": "base",
+        "ImuRecord": "imu",
+        "Late": "base",
+        "MasterRecord": "poses",
+        "OdometerRecord": "odometer",
+        "Record": "base",
+        "Trajectory": "poses",
+        "VelocityRecord": "velocity",
+    },
+)

@@ -1,7 +1,8 @@
-"""Attitude, velocity and position between the samples of a trajectory."""
+"""Attitude, velocity and position between the samples of a trajectory, and rates between those of a log."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
+from truenorth.records.imu import ImuRecord
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9  # of the interval: times this little outside the span are its ends
@@ -74,6 +76,11 @@ class Between:
 def held_at_ends(time: Array, values: Array, times: Array) -> Array:
     """(M, m) of (N, m) values at other times, along straight lines; beyond the ends the first and the last."""
     return np.stack([np.interp(times, time, column) for column in values.T], axis=1)
+
+
+def gyros_behind(record: ImuRecord, late: float) -> ImuRecord:
+    """The record with its gyros late by so many seconds, parts of a row too."""
+    return replace(record, gyro=held_at_ends(record.time, record.gyro, record.time - late))
 
 
 def interpolated(record: Any, times: ArrayLike) -> dict[str, Any]:
