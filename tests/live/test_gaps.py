@@ -101,7 +101,7 @@ def test_rows_that_are_stamped_late_are_no_gaps():
     run = case.run()
     answers = case.feed(run, 3, every=1.0)
     assert late.sum() > 5
-    assert run._gaps == []
+    assert run._loop.gaps == []
     assert sum(r.rejected for r in run.residuals) == 0
     assert np.abs(case.off_velocity(answers)).max() < 4.0
 

@@ -125,7 +125,7 @@ def test_chunks_and_questions_change_no_bit_nor_does_a_run_that_was_saved(tmp_pa
 def test_a_run_that_was_saved_without_them_is_of_another_version(tmp_path, monkeypatch):
     """It would go on without the comparison, in silence."""
     case = Anchored(STILL, "consumer", 10.0, 1)
-    monkeypatch.setattr(navigator, "KEPT", tuple(name for name in navigator.KEPT if name != "_siblings"))
+    monkeypatch.setattr(navigator, "KEPT", tuple(name for name in navigator.KEPT if name != "_loop"))
     case.run().save(tmp_path / "run.npz")
     monkeypatch.undo()
     with pytest.raises(DataError, match="not a result of this version"):
@@ -167,4 +167,4 @@ def test_without_another_sensor_there_is_nothing_that_shows_heading_and_nothing_
     run = Navigator(case.start, case.spec, altitude="fixed", kind=case.log.kind)
     run.push(case.log.time, case.log.gyro, case.log.accel)
     assert run.answer.status == "navigated"
-    assert run._siblings._states == []
+    assert run._loop.siblings._states == []

@@ -40,6 +40,14 @@ FARTHEST = 2.0  # steps, to the top of a parabola
 GAINED = 0.5  # of twice the log-likelihood, in a sweep that is worth another one
 
 
+def usual(aiding: Iterable[Aiding]) -> dict[str, Lasting]:
+    """Slow errors as they are usual of receivers, next to all that these say of their noise, by the source's name.
+
+    Of receivers of whose errors no log has shown how they last.
+    """
+    return {s.name: _lasting(s, 1.0, *USUAL[s.name][0][1:]) for s in _unsaid(aiding)}
+
+
 def fitted(
     run: Callable[[Slow], Track], slow: Slow, aiding: Iterable[Aiding], *, said: bool
 ) -> tuple[Slow, list[Evidence]]:
@@ -56,7 +64,7 @@ def fitted(
     said : bool
         Whether the receiver says how good its fixes are: else what was seen in innovations is the usual size of their slow error.
     """
-    sources = {s.name: s for s in aiding if s.name in USUAL and KINDS[s.name].role not in s.states}
+    sources = {s.name: s for s in _unsaid(aiding)}
     names = [name for name in sources if name in slow or name == SPEEDS]
     if not any(name in slow for name in names):
         return slow, []
@@ -79,6 +87,11 @@ def fitted(
     new = [(name, *_correlation(found[name], sources[name])) for name in names if name not in slow]
     unit = {name: sources[name].row.unit for name in names}
     return found, [wanders(name, r, size, unit[name]) for name, r, size in new if r > limit("colour")]
+
+
+def _unsaid(aiding: Iterable[Aiding]) -> list[Aiding]:
+    """Sources of a receiver of whose slow errors nothing was said."""
+    return [s for s in aiding if s.name in USUAL and KINDS[s.name].role not in s.states]
 
 
 def lowest(misfit: Callable[[Array], float], start: Array) -> Array:

@@ -15,9 +15,9 @@ from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
 from truenorth.formats.phone import PHONE, accuracies, speed_and_bearing
 from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Quantity
-from truenorth.formats.stale import without_stale
 from truenorth.formats.zipped import of_folder, unpacked
 from truenorth.records import GnssRecord
+from truenorth.records.stale import without_stale
 
 Array = NDArray[np.float64]
 

@@ -17,13 +17,14 @@ from truenorth.live.going import Going
 from truenorth.live.intake import Intake
 from truenorth.live.known_feeds import FEEDS
 from truenorth.live.log import Log
+from truenorth.live.loop import Loop
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.recent import Recent
 from truenorth.live.siblings import Siblings
 
 PLAIN: dict[str, type[Any]] = {
-    kind.__name__: kind for kind in (Log, Intake, Felt, Past, Recent, Carry, Going, NoiseSeen, Siblings)
+    kind.__name__: kind for kind in (Log, Intake, Felt, Past, Recent, Carry, Going, Loop, NoiseSeen, Siblings)
 }
 PLAIN |= {kind.__name__: kind for kind in FEEDS.values()}  # type: ignore[misc]  # classes, called as functions
 
@@ -56,7 +57,9 @@ def kept(path: str | PathLike[str], kind: str, names: Collection[str] = ()) -> d
 
 def _packed(value: Any) -> Any:
     if type(value).__name__ in PLAIN:
-        return {"plain": type(value).__name__, "state": {name: _packed(part) for name, part in vars(value).items()}}
+        left_out = getattr(value, "made_anew", ())
+        state = {name: _packed(part) for name, part in vars(value).items() if name not in left_out}
+        return {"plain": type(value).__name__, "state": state}
     if isinstance(value, deque):
         return {"deque": [_packed(part) for part in value]}
     if isinstance(value, list):

@@ -18,30 +18,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Aid, Gnss
-from truenorth.aiding.source import Aiding
 from truenorth.alignment import Alignment
 from truenorth.core.errors import DataError, UsageError
-from truenorth.errors.model import InsModel
-from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.rivals import counted_once
-from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.answer import Answer, Motion
-from truenorth.live.bridges import Gap, bridged, unbroken
 from truenorth.live.feed import Feed
 from truenorth.live.felt import Felt, without_known
 from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
-from truenorth.live.noise_seen import NoiseSeen
+from truenorth.live.loop import Loop
 from truenorth.live.past import Past
-from truenorth.live.siblings import Siblings
 from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.by_start import unsure_heading
 from truenorth.navigation.curve import with_curve
-from truenorth.navigation.given import arm_as_begun, fed_back, kept_altitude, mountings_found
-from truenorth.navigation.procedure import FINE, PLUMB_LINE
+from truenorth.navigation.given import arm_as_begun, kept_altitude, mountings_found
+from truenorth.navigation.procedure import FINE
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
-from truenorth.navigation.start import acting_at_rest, force_at_rest, start_of
+from truenorth.navigation.start import acting_at_rest, start_of
 from truenorth.quality.absolute import known_as_followed
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import Late
@@ -51,16 +45,24 @@ from truenorth.state.layout import DP, DV
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Residuals, Track
-from truenorth.strapdown.increments import ImuRows
 
 Array = NDArray[np.float64]
 
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
-    "start", "spec", "_given", "_imu", "_imu_source", "feeds", "_mountings", "altitude", "intake", "log", "output", "failure",
-    "past", "_waiting", "_state", "_interval", "_last", "_sent", "_gaps", "_noise", "_siblings",
-)  # fmt: skip
-FIRST = 20  # rows that show the interval of sampling
+    "start",
+    "spec",
+    "_given",
+    "_imu",
+    "_imu_source",
+    "feeds",
+    "_mountings",
+    "altitude",
+    "intake",
+    "log",
+    "output",
+    "_loop",
+)
 STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
 NEWEST = 1000  # rows of a receiver that say how well a fix is known
 
@@ -114,19 +116,8 @@ class Navigator:
         self.altitude, self._why = kept_altitude(altitude, dummies)
         self.intake, self.log = Intake(felt), Log(kind, most_rows)
         self.output = output
-        self.failure = ""
-        self.past = Past()
+        self._loop = Loop(self.start, self.spec, kind, self.altitude, output, self._mountings)
         self.on_taken(None)
-        self._waiting: list[Array] = []
-        self._setting: Setting | None = None
-        self._state: LoopState | None = None
-        self._interval = 0.0
-        # The row that the loop took last, as it came; of the start its time alone counts.
-        self._last = np.full(7, self.start.time)
-        self._sent: dict[str, dict[str, float]] = {key: {} for key in self.feeds}
-        self._gaps: list[tuple[float, float]] = []
-        self._noise = NoiseSeen(self.spec, kind)
-        self._siblings = Siblings(self.start)
         self._lock = threading.Lock()
 
     def __repr__(self) -> str:
@@ -149,13 +140,26 @@ class Navigator:
                     self.intake.counts.too_late += len(block)
                     continue
                 self._taken(block)
-                self._waiting.append(block)
-            if self.log.end - LATE - self._loop_end > STEP:
-                self._advance(self.log.end - LATE)
+                self._loop.add(block)
+            if self.log.end - LATE - self._loop.end > STEP:
+                self._advance()
 
     def on_taken(self, taken: Callable[[Array], None] | None) -> None:
         """Call this with each block of rows from now on."""
         self._taken = taken or (lambda rows: None)
+
+    def _advance(self) -> None:
+        self._loop.advance(self.log.end - LATE, self.feeds, self.log)
+
+    @property
+    def failure(self) -> str:
+        """Why the run is at its end; empty while it goes on."""
+        return self._loop.failure
+
+    @property
+    def past(self) -> Past:
+        """What the loop has put out."""
+        return self._loop.past
 
     @property
     def residuals(self) -> tuple[Residuals, ...]:
@@ -171,8 +175,8 @@ class Navigator:
     def answer(self) -> Answer | None:
         """Where the vehicle is now, at the newest row; None before the first rows."""
         with self._lock:
-            self._advance(self.log.end - LATE)
-            found = self._now()
+            self._advance()
+            found = self._loop.now(self.feeds, self.log)
         if found is None:
             return None
         result = self._judged(*found)
@@ -222,11 +226,11 @@ class Navigator:
             silent = [note("feed.silent", name=key) for key, aid in came.items() if aid is None]
             return replace(found, evidence=(*found.evidence, *silent))
         with self._lock:
-            last = self._now()
+            last = self._loop.now(self.feeds, self.log)
             if last is None:
                 raise DataError(self.failure)
             track, siblings, _ = last
-            return self._judged(self.past.with_end(track), self._siblings.along(siblings))
+            return self._judged(self.past.with_end(track), self._loop.siblings.along(siblings))
 
     def _kept_with(self, aids: Mapping[str, Aid]) -> Altitude | None:
         """How height is kept: as in the loop; where its sensor brought no height, as the aids allow."""
@@ -238,8 +242,7 @@ class Navigator:
     def save(self, path: str | PathLike[str]) -> Path:
         """Write all that the run goes on from, whole or not at all; see :meth:`load`."""
         with self._lock:
-            if self._setting is not None:
-                self._siblings.settle(self._setting)
+            self._loop.settle(self.feeds)
             return keep(path, "Navigator", {name: getattr(self, name) for name in KEPT})
 
     @classmethod
@@ -263,127 +266,40 @@ class Navigator:
         )
         vars(found).update(state)
         found._given = start
-        if found._state is not None:
-            found._setting = found._set()
         return found
 
     def close(self) -> None:
         """Nothing runs on."""
 
-    # The loop
-
-    @property
-    def _loop_end(self) -> float:
-        """Up to where the loop has taken rows, s."""
-        return float(self._last[0])
-
-    def _begin(self, rows: Array) -> None:
-        """Make the loop ready, when enough rows are there to know their interval."""
-        self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
-        self._setting = self._set()
-        time = float(rows[0, 0]) - self._interval
-        self._state = begin(self._setting, self.start, time, self._interval)
-        if self.feeds:  # else errors grow as the start says
-            self._siblings.begin(self._setting, time, self._interval)
-
-    def _set(self) -> Setting:
-        sources: list[Aiding] = []
-        for key, feed in self.feeds.items():
-            sources += feed.sources(self.altitude, self._mountings.get(key))
-        sources += [Aiding.disturbance("gap"), Aiding.disturbance("noise")]
-        noise, fixed = self.spec.with_random_walks(self._interval), self.altitude == "fixed"
-        model = InsModel.from_spec(
-            noise, standing=force_at_rest(self.start), groups=PLUMB_LINE.groups, fixed_altitude=fixed
-        )
-        stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
-        return Setting(with_states(model, sources), tuple(sources), stride, every, invariant=fed_back(sources))
-
-    def _advance(self, until: float) -> None:
-        """Take the rows and measurements up to a time; rows that come for a time before it are too late."""
-        if self.failure or not self._waiting:
-            return
-        rows = np.vstack(self._waiting)
-        rows = rows[np.argsort(rows[:, 0], kind="stable")]
-        if self._state is None:
-            if len(rows) < FIRST:
-                return
-            self._begin(rows)
-        self._waiting = [rows]
-        count = int(np.searchsorted(rows[:, 0], until, side="right"))
-        late = int(np.searchsorted(rows[:, 0], self._loop_end, side="right"))
-        if count <= late:
-            return
-        part, self._waiting = rows[late:count], [rows[count:]] if count < len(rows) else []
-        assert self._setting is not None
-        assert self._state is not None
-        try:
-            measured = self._measurements()
-            samples, disturbances, gaps = self._bridged(part)
-            self._gaps += gaps
-            aiding = [*measured, *disturbances, self._noise.growth(part)]
-            self._state, track = go_on(self._setting, self._state, samples, aiding)
-        except DataError as error:
-            self.failure = str(error)
-            return
-        self._last = part[-1].copy()
-        self.past.add(track)
-        self._siblings.take(self._setting, samples, aiding, track)
-
-    def _bridged(self, rows: Array) -> tuple[ImuRows, list[Aiding], list[Gap]]:
-        begins = self._loop_end == self.start.time
-        coming = np.sort(np.concatenate([np.empty(0), *(block[:, 0] for block in self._waiting)]))
-        coming = coming[coming > rows[-1, 0]]
-        return bridged(rows, self._last, coming, self._interval, self.log, begins=begins)
-
-    def _measurements(self) -> list[Aiding]:
-        """New ones of all feeds; those of a feed whose rows cannot be are left out."""
-        found: list[Aiding] = []
-        for feed in self.feeds.values():
-            try:
-                mounting, sent = self._mountings.get(feed.key), self._sent[feed.key]
-                found += feed.measurements(self.altitude, mounting, sent, self.start.time)
-            except DataError as error:
-                self.past.note(feed.key, str(error))
-        return found
-
-    def _now(self) -> tuple[Track, list[Track], float] | None:
-        """One epoch: the loop carried over the rows that wait, which it does not take; siblings there, and how far they were."""
-        if self._state is None or self._setting is None:
-            return None
-        waiting = np.vstack(self._waiting) if self._waiting else np.empty((0, 7))
-        waiting = waiting[waiting[:, 0] > self._loop_end]
-        # A gap too long to bridge ends it, unless late rows fill it: the answer holds before it.
-        waiting = unbroken(waiting, self._last, self._interval, begins=self._loop_end == self.start.time)
-        samples, found = None, self.past.last
-        if len(waiting) and not self.failure:
-            samples, disturbances, _ = self._bridged(waiting)
-            found = go_on(self._setting, self._state, samples, disturbances, last=True)[1][-1:]
-        if found is None:
-            return None
-        return found, self._siblings.now(self._setting, float(found.time[0]), samples), self._siblings.most
+    # The verdict
 
     def _judged(self, track: Track, siblings: Sequence[Track], most: float = 0.0) -> Navigation:
         """The verdict on the loop's track, position known no better than by a fix where nobody spoke of slow errors.
 
         Heading is known no better than siblings leave it; `most`: how far they were before this track.
         """
-        if self._setting is not None:
-            track = with_curve(track, self._setting.sources)
+        if self._loop.begun:
+            track = with_curve(track, self._loop.setting(self.feeds).sources)
         track = replace(track, residuals=self.past.residuals)
         receiver = (
             None if Gnss.key not in self.feeds else self.feeds[Gnss.key].newest(NEWEST, self._mountings.get(Gnss.key))
         )
         wanders: list[Evidence] = []
         if isinstance(receiver, Gnss):
-            track, wanders = known_as_followed(track, receiver, self.altitude, self.start)
+            track, wanders = known_as_followed(track, receiver, self.altitude, self.start, self._loop.slow)
         slow = {str(item.figures["name"]) for item in wanders}
-        evidence = [*innovation_evidence(track.residuals, last_sigma(track), in_sigma=slow), *wanders, *self._why]
-        gaps, late = tuple(self._gaps), dict[str, Late]()
+        evidence = [
+            *innovation_evidence(track.residuals, last_sigma(track), in_sigma=slow),
+            *wanders,
+            *self._loop.said,
+            *self._why,
+        ]
+        gaps, late = tuple(self._loop.gaps), dict[str, Late]()
         how = (self.altitude, False, gaps, 0, self._imu_source, "live", late, None)
         result = Navigation("navigated", (), track, *how, *acting_at_rest(self.start, self.spec))
         growth = None
         if siblings:
-            others = self._siblings.others
+            others = self._loop.siblings.others
             growth = others.growth(track, others.moved(track, siblings), most)
             evidence += unsure_heading(track, growth)
         return judged_navigation(result, counted_once(evidence), growth)

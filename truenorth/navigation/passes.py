@@ -126,18 +126,9 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     plan, track = _with_swing_apart(plan, given, track, smooth)  # as late as it is now
     if plan is not as_it_was:
         plan, track = _with_unseen_swing(plan, given, track, smooth)
-    for _ in range(2):  # one sensor's may hide another's
-        slow, shown = slow_errors(track, plan.sources(given))
-        if not slow:
-            break
-        plan = replace(plan, slow={**plan.slow, **slow})
-        said += shown
-        track = plan.run(plan.sources(given), smooth=smooth)
+    plan, track, lasting = with_slow_errors(plan, given, track, smooth)
+    said += lasting
     receiver = given.get(Gnss.key)
-    if isinstance(receiver, Gnss) and plan.slow.keys() & {FIXES, SPEEDS}:
-        plan, more = _fitted(plan, given, receiver)
-        said += more
-        track = plan.run(plan.sources(given), smooth=smooth)
     track = track.whole()
     if isinstance(receiver, Gnss):
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
@@ -153,6 +144,26 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
             continue
         track = counted_between(track, name, given[key].mounting, asked[key].mounting)
     return plan, given, track, said
+
+
+def with_slow_errors(
+    plan: Plan, given: Mapping[str, Any], track: Track, smooth: bool = False
+) -> tuple[Plan, Track, list[Evidence]]:
+    """The plan with errors of its aids that last, as far as innovations show them, its track, and what is to be said of them."""
+    said: list[Evidence] = []
+    for _ in range(2):  # one sensor's may hide another's
+        slow, shown = slow_errors(track, plan.sources(given))
+        if not slow:
+            break
+        plan = replace(plan, slow={**plan.slow, **slow})
+        said += shown
+        track = plan.run(plan.sources(given), smooth=smooth)
+    receiver = given.get(Gnss.key)
+    if isinstance(receiver, Gnss) and plan.slow.keys() & {FIXES, SPEEDS}:
+        plan, more = _fitted(plan, given, receiver)
+        said += more
+        track = plan.run(plan.sources(given), smooth=smooth)
+    return plan, track, said
 
 
 def _with_late_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:
@@ -343,7 +354,7 @@ def _as_noisy(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> 
     return plan, track
 
 
-def _fitted(plan: Plan, given: dict[str, Any], receiver: Gnss) -> tuple[Plan, list[Evidence]]:
+def _fitted(plan: Plan, given: Mapping[str, Any], receiver: Gnss) -> tuple[Plan, list[Evidence]]:
     """The plan with slow errors of the receiver that the log's first part makes likeliest, and what is new to be said."""
     part = plan.record.between(None, plan.record.time[0] + PART)
     short = replace(plan, record=part, interval=max(plan.interval, COARSE), every=len(part))

@@ -30,7 +30,7 @@ from truenorth.aiding.aids import Gnss
 from truenorth.aiding.sensors import place_axes, place_sigma
 from truenorth.aiding.source import Aiding
 from truenorth.quality.aid_noise import NEWEST, white_part
-from truenorth.quality.slow_aids import FIXES, Lasting, as_lasting, says_size, slow_errors, usual_bias, with_slow
+from truenorth.quality.slow_aids import FIXES, Lasting, Slow, as_lasting, says_size, slow_errors, usual_bias, with_slow
 from truenorth.quality.swing import unseen_arm
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
@@ -120,13 +120,13 @@ def shared_part(white: float, sigma: float) -> float:
 
 
 def known_as_followed(
-    track: Track, receiver: Gnss, altitude: str, start: Start | None = None
+    track: Track, receiver: Gnss, altitude: str, start: Start | None = None, modelled: Slow | None = None
 ) -> tuple[Track, list[Evidence]]:
-    """The track of a loop that has no states for slow errors of its fixes, and what is to be said of such errors.
+    """The track of a loop with its place as unsure as fixes leave it, and what is to be said of slow errors that it does not have.
 
-    The loop follows a slow error. So position is known no better than by a fix (:func:`known_as_fixes`), nor than the slow error
-    that the innovations up to now show. What their colour says of position is in sigma then. And what fixes that wander seem to
-    say of the antenna's arm is as little knowledge: of the place, the arm hides as much as it did at the start.
+    A loop without states for a slow error follows it. So position is known no better than by a fix (:func:`known_as_fixes`), nor
+    than the slow error that the innovations up to now show. What their colour says of position is in sigma then. And what fixes
+    that wander seem to say of the antenna's arm is as little knowledge: of the place, the arm hides as much as it did at the start.
 
     Parameters
     ----------
@@ -138,11 +138,16 @@ def known_as_followed(
         How height is kept.
     start : Start, optional
         Of the loop.
+    modelled : mapping of str to Lasting, optional
+        Slow errors that are states of the loop.
     """
-    fixes = [source for source in receiver.sources(altitude) if source.name == FIXES]
-    slow, said = slow_errors(track, fixes)
+    slow = modelled or {}
+    fixes = [source for source in with_slow(receiver.sources(altitude), slow) if source.name == FIXES]
     bias = None if receiver.mounting is None else receiver.mounting.bias_sigma
-    known = known_as_fixes(track, receiver.record, bias, fixes=next(iter(fixes), None))
+    known = known_as_fixes(track, receiver.record, bias, slow.get(FIXES), next(iter(fixes), None))
+    if FIXES in slow:
+        return known, []
+    slow, said = slow_errors(track, fixes)
     found = as_lasting(known, with_slow(fixes, slow))
     return (_with_arm_of(found, start) if said and start is not None else found), said
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
-from truenorth.records import GnssRecord
+from truenorth.records.gnss import GnssRecord
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,6 @@ def without_stale(record: GnssRecord) -> GnssRecord:
     rows = np.flatnonzero(record.has_position)
     if len(rows) < 2:
         return record
-    time, away, fine = record.time[rows], *_places(record, rows)
     height = record.alt[rows]
     same = (record.lat[rows][1:] == record.lat[rows][:-1]) & (record.lon[rows][1:] == record.lon[rows][:-1])
     same &= (height[1:] == height[:-1]) | np.isnan(height[1:] + height[:-1])
@@ -59,6 +58,7 @@ def without_stale(record: GnssRecord) -> GnssRecord:
     starts = np.flatnonzero(np.concatenate([[True], ~same]))
     if len(starts) < FEWEST:
         return record
+    time, away, fine = record.time[rows], *_places(record, rows)
     ends = np.append(starts[1:], len(rows))
     said, speed = _said_velocity(record, rows)
     pace, leap, wait = _leaps(time, away, starts, ends, speed)

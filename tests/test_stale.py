@@ -7,8 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 import truenorth
-from truenorth.formats.stale import without_stale
+from truenorth.aiding.aids import Gnss
+from truenorth.live import GnssFeed
 from truenorth.records import GnssRecord
+from truenorth.records.stale import without_stale
 
 Array = NDArray[np.float64]
 LAT, LON = 48.0, 11.0
@@ -138,3 +140,30 @@ def test_headings_of_a_receiver_that_hangs_are_left_out_too() -> None:
         heading=heading,
     )
     assert len(without_stale(record)) == 88
+
+
+def hung() -> GnssRecord:
+    """Fixes of a program, not of a file; the receiver repeats that of 50 s for a dozen seconds."""
+    time, north, speed = driven()
+    north[50:62], speed[50:62] = north[49], speed[49]
+    lat = np.radians(LAT) + north / 6_371_000.0
+    zero = np.zeros(len(time))
+    return GnssRecord(time, lat, zero + np.radians(LON), zero + 500.0, v_n=np.stack([zero, speed, zero], axis=1))
+
+
+def test_an_aid_takes_no_fix_twice() -> None:
+    aid = Gnss(hung())
+    assert aid.record.stale == 12
+    assert Gnss(aid.record).record is aid.record
+    for source in aid.sources("gnss"):
+        assert not ((source.time >= 50.0) & (source.time < 62.0)).any()
+
+
+def test_a_feed_takes_no_fix_twice_before_the_next_one_comes() -> None:
+    record, feed, sent = hung(), GnssFeed(), dict[str, float]()
+    came = []
+    for row in range(len(record)):
+        feed.push(record.time[row], record.lat[row], record.lon[row], record.alt[row], v_n=record.v_n[row])
+        for source in feed.measurements("gnss", None, sent, -1.0):
+            came += source.time.tolist() if source.name == "GNSS position" else []
+    assert sorted(set(record.time) - set(came)) == list(np.arange(50.0, 62.0))

@@ -1,0 +1,137 @@
+"""A receiver whose errors last, on a running answer: they are states of its loop, as in the whole log; any chunks, saved or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from tests.live.test_siblings import SWELL, Anchored
+from truenorth.core.earth import radii
+from truenorth.core.errors import DataError
+from truenorth.live import Navigator, loop
+from truenorth.live.lasting import lasting_errors
+from truenorth.navigation import navigate
+from truenorth.state.layout import DV
+from truenorth.state.mounting import Mounting
+
+
+def coloured(rng, count, sigma, time):
+    """(count, 3) first-order Gauss-Markov errors, one row a second."""
+    a = np.exp(-1.0 / time)
+    white = sigma * rng.standard_normal((count, 3))
+    white[1:] *= np.sqrt(1.0 - a * a)
+    return np.asarray(lfilter([1.0], [1.0, -a], white, axis=0))
+
+
+class Wandering(Anchored):
+    """A vessel in a swell whose receiver says how large its errors are, and not that they last."""
+
+    def __init__(self, seed, duration=150.0, slow=2.0, quick=0.05):
+        super().__init__(SWELL, "industrial", duration, seed)
+        rng, fixes = np.random.default_rng([seed, 5]), self.aid.record
+        place, v = coloured(rng, len(fixes), slow, 60.0), coloured(rng, len(fixes), quick, 6.0)
+        R_M, R_N = radii(fixes.lat[0])
+        record = replace(
+            fixes,
+            lat=fixes.lat + place[:, 1] / R_M,
+            lon=fixes.lon + place[:, 0] / (R_N * np.cos(fixes.lat)),
+            alt=fixes.alt + place[:, 2],
+            v_n=fixes.v_n + v,
+            position_sigma=np.hypot(fixes.position_sigma, slow),
+            velocity_sigma=np.hypot(fixes.velocity_sigma, quick),
+        )
+        self.aid = type(self.aid)(record, Mounting(lever_arm=self.aid.mounting.lever_arm))
+
+    def off_velocity(self, answers):
+        true = self.motion.states(np.array([a.time for a in answers]))
+        off = np.stack([a.motion.v_n for a in answers]) - true.v_n
+        return off / np.stack([a.motion.v_sigma for a in answers])
+
+
+def rms_of_velocity(seeds):
+    """RMS of velocity over sigma of runs, at every 5 s of each; a figure of (E, N, U)."""
+    off = [case.off_velocity(case.feed(case.run(), 25, every=5.0)) for case in map(Wandering, seeds)]
+    return np.sqrt(np.mean(np.square(np.concatenate(off)), axis=0))
+
+
+@pytest.mark.slow
+def test_velocity_is_as_unsure_as_errors_that_last_leave_it(monkeypatch):
+    """Four runs of 30 answers that are not independent: RMS scatters by some 0.2."""
+    seeds = (1, 2, 3, 4)
+    assert (rms_of_velocity(seeds) < 1.45).all()
+    monkeypatch.setattr(loop, "LOOKS", ())
+    assert rms_of_velocity(seeds).max() > 1.6
+
+
+def test_after_a_look_sigma_is_that_of_the_whole_log():
+    case = Wandering(1, duration=100.0)
+    run = case.run()
+    case.feed(run, 25)
+    answer = run.answer
+    assert set(run._loop.slow) == {"GNSS position", "GNSS velocity"}
+    aid = type(case.aid)(case.aid.record.between(None, answer.time - 0.1), case.aid.mounting)
+    whole = navigate(case.log.between(None, answer.time), case.start, aid=aid, imu=case.spec, output=1.0)
+    np.testing.assert_allclose(answer.motion.v_sigma, whole.track.sigma[-1, DV], rtol=0.2)
+
+
+def test_before_a_minute_of_fixes_errors_last_as_is_usual_and_white_ones_then_do_not():
+    case = Wandering(1, duration=90.0, slow=0.0, quick=0.0)
+    run = case.run()
+    case.feed(run, 25, until=40.0)
+    assert set(run._loop.slow) == {"GNSS position", "GNSS velocity"}
+    assert all(lasting.white == 1.0 for lasting in run._loop.slow.values())
+    unsure = run.answer.motion.v_sigma
+    case.feed(run, 25, since=40.0)
+    assert run._loop.slow == {}
+    assert (run.answer.motion.v_sigma < unsure).all()
+    assert sum(r.rejected for r in run.residuals) == 0
+
+
+def test_a_slow_error_that_is_said_is_not_taken_as_usual():
+    case = Anchored(SWELL, "industrial", 20.0, 1)  # fixes with no slow error, by what is said
+    run = case.run()
+    case.feed(run, 25)
+    assert set(run._loop.slow) == {"GNSS velocity"}
+
+
+def test_looks_change_no_bit_whatever_the_chunks_saved_or_not(tmp_path):
+    case = Wandering(2, duration=85.0)
+    one, other = case.run(), case.run()
+    case.feed(one, 3)
+    case.feed(other, 60, until=76.0)
+    other = Navigator.load(other.save(tmp_path / "run.npz"))
+    case.feed(other, 60, since=76.0)
+    assert one._loop.slow
+    for name in ("v_n", "position", "v_sigma", "position_sigma"):
+        np.testing.assert_array_equal(getattr(one.answer.motion, name), getattr(other.answer.motion, name))
+
+
+def test_a_loop_that_breaks_down_with_such_errors_goes_on_without(monkeypatch):
+    case = Wandering(1, duration=30.0)
+    run = case.run()
+    case.feed(run, 25, until=5.5)
+
+    def broken(*_, **__):
+        monkeypatch.undo()
+        raise DataError("the covariance is lost in rounding")
+
+    def looked(*args):
+        monkeypatch.setattr(loop, "go_on", broken)
+        return lasting_errors(*args)
+
+    monkeypatch.setattr(loop, "lasting_errors", looked)
+    case.feed(run, 25, since=5.5)
+    assert loop.go_on is not broken
+    assert run._loop.slow == {}
+    assert run.failure == ""
+    assert run.answer.status == "navigated"
+
+
+@pytest.mark.slow
+def test_a_run_whose_rows_are_added_up_looks_back_no_more():
+    case = Wandering(1, duration=150.0)
+    run = case.run(most_rows=1000)
+    answers = case.feed(run, 25, every=5.0)
+    assert run.log.merged > 1
+    assert np.abs(case.off_velocity(answers)).max() < 5.0

@@ -1,0 +1,77 @@
+"""Errors of aids that last, as the rows up to now show them: a receiver's multipath and atmosphere, a wheel's slip.
+
+:func:`truenorth.navigate` finds them by passes over the whole log (:mod:`truenorth.navigation.passes`). A running answer makes the
+same passes at a few times: they are then states of its loop. Of a receiver whose rows are too few to show them, they are taken as
+is usual of receivers. Taken for white, errors of a fix that last for a minute, and of a velocity that last for seconds, pull at the
+velocity of an answer: it was up to 5 sigmas off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from truenorth.aiding.aids import Aid, Gnss
+from truenorth.aiding.source import Aiding
+from truenorth.core.errors import DataError, UsageError
+from truenorth.errors.axes import axis_sigma
+from truenorth.errors.model import InsModel
+from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.slow_fit import usual
+from truenorth.navigation.passes import Plan, with_slow_errors
+from truenorth.navigation.procedure import FINE
+from truenorth.navigation.result import Altitude
+from truenorth.quality.slow_aids import FIXES, LEAST_ROWS, Slow
+from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence
+from truenorth.state.state import Start
+
+LOOKS = (5.0, 75.0, 150.0, 300.0, 600.0)  # s after the start
+
+
+def lasting_errors(
+    record: ImuRecord,
+    start: Start,
+    model: InsModel,
+    altitude: Altitude,
+    spec: ImuSpec,
+    aids: Mapping[str, Aid | None],
+) -> tuple[Slow, list[Evidence]]:
+    """Errors of aids that last, by their sources' names, and what is to be said of them.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        The rows from the start on.
+    start : Start
+    model : InsModel
+        Of the loop, without states of aids.
+    altitude : {"fixed", "free", "baro", "gnss"}
+        How height is kept.
+    spec : ImuSpec
+    aids : mapping of str to Aid or None
+        Up to the record's end, by their keys; None: too few rows.
+    """
+    given = {key: aid for key, aid in aids.items() if aid is not None}
+    sources = [source for aid in given.values() for source in aid.sources(altitude)]
+    unseen = usual(source for source in sources if 0 < _seconds(source) < LEAST_ROWS)
+    receiver = given.get(Gnss.key)
+    if isinstance(receiver, Gnss) and receiver.mounting is not None and receiver.mounting.bias_sigma is not None:
+        unseen.pop(FIXES, None)
+    if all(_seconds(source) < LEAST_ROWS for source in sources):
+        return unseen, []
+    try:
+        record, _, disturbances = bridge_gaps(record)
+        every = max(1, round(1.0 / FINE))
+        plan = Plan(record, start, model, altitude, disturbances, FINE, every, axis_sigma(spec)[0].max())
+        plan, _, said = with_slow_errors(plan, given, plan.run(plan.sources(given)))
+    except (DataError, UsageError):  # the loop itself says what is wrong
+        return unseen, []
+    return {**unseen, **plan.slow}, said
+
+
+def _seconds(source: Aiding) -> int:
+    """How many seconds of the log have rows of a source: so many means show how its errors last."""
+    return len(np.unique(np.floor(source.time)))

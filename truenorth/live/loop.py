@@ -1,0 +1,234 @@
+"""The closed loop of a navigation while its log is still running: rows and measurements in, a track and the newest epoch out.
+
+From time to time the loop looks back at all rows so far, as :func:`truenorth.navigate` does at a whole log: errors of its aids that
+last, which no single row shows, are then states of it, and it takes the rows anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.source import Aiding
+from truenorth.core.errors import DataError
+from truenorth.errors.model import InsModel
+from truenorth.estimate.events import LoopState, Setting
+from truenorth.estimate.run import begin, go_on, with_states
+from truenorth.live.bridges import Gap, bridged, unbroken
+from truenorth.live.feed import Feed
+from truenorth.live.lasting import LOOKS, lasting_errors
+from truenorth.live.log import Kind, Log
+from truenorth.live.noise_seen import NoiseSeen
+from truenorth.live.past import Past
+from truenorth.live.siblings import Siblings
+from truenorth.navigation.given import fed_back
+from truenorth.navigation.procedure import FINE, PLUMB_LINE
+from truenorth.navigation.result import Altitude
+from truenorth.navigation.start import force_at_rest
+from truenorth.quality.slow_aids import Slow, with_slow
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence
+from truenorth.state.mounting import Mounting
+from truenorth.state.state import Start
+from truenorth.state.track import Track
+from truenorth.strapdown.increments import ImuRows
+
+Array = NDArray[np.float64]
+
+FIRST = 20  # rows that show the interval of sampling
+
+
+class Loop:
+    """Where a run is, in bounded memory.
+
+    Parameters
+    ----------
+    start : Start
+    spec : ImuSpec
+        Without what is known of the IMU.
+    kind : {"rates", "increments"}
+        What a row is.
+    altitude : {"fixed", "free", "baro", "gnss"}
+        How height is kept.
+    output : float, s
+        Between two epochs of the track.
+    mountings : mapping of str to Mounting
+        Of feeds to which none is given, by their keys.
+    """
+
+    made_anew: ClassVar[tuple[str, ...]] = ("_made",)  # not kept in a file
+    _made: Setting | None = None
+
+    def __init__(
+        self,
+        start: Start,
+        spec: ImuSpec,
+        kind: Kind,
+        altitude: Altitude,
+        output: float,
+        mountings: Mapping[str, Mounting],
+    ) -> None:
+        self.start, self.spec, self.kind, self.altitude, self.output = start, spec, kind, altitude, output
+        self.mountings = dict(mountings)
+        self.failure = ""
+        self.slow: Slow = {}  # errors of aids that last, as the last look has found them
+        self.said: list[Evidence] = []
+        self._looks = 0
+        self._waiting: list[Array] = []
+        self._anew()
+
+    def _anew(self) -> None:
+        """Forget all rows that were taken."""
+        self.past = Past()
+        self.gaps: list[Gap] = []
+        self.siblings = Siblings(self.start)
+        self._noise = NoiseSeen(self.spec, self.kind)
+        self._made = None
+        self._state: LoopState | None = None
+        self._interval = 0.0
+        # The row that was taken last, as it came; of the start its time alone counts.
+        self._last = np.full(7, self.start.time)
+        self._sent: dict[str, dict[str, float]] = {}
+
+    @property
+    def end(self) -> float:
+        """Up to where rows are taken, s."""
+        return float(self._last[0])
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is an epoch to be put out."""
+        return self._state is not None
+
+    def add(self, rows: Array) -> None:
+        """Let rows (K, 7) wait until they are taken."""
+        self._waiting.append(rows)
+
+    def setting(self, feeds: Mapping[str, Feed]) -> Setting:
+        """What the loop keeps to until it begins anew."""
+        if self._made is None:
+            self._made = self._set(feeds)
+        return self._made
+
+    def _set(self, feeds: Mapping[str, Feed]) -> Setting:
+        asked = [s for key, feed in feeds.items() for s in feed.sources(self.altitude, self.mountings.get(key))]
+        sources = [*with_slow(asked, self.slow), Aiding.disturbance("gap"), Aiding.disturbance("noise")]
+        stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
+        model = with_states(self._model(), sources)
+        return Setting(model, tuple(sources), stride, every, invariant=fed_back(sources))
+
+    def _model(self) -> InsModel:
+        noise, fixed = self.spec.with_random_walks(self._interval), self.altitude == "fixed"
+        standing = force_at_rest(self.start)
+        return InsModel.from_spec(noise, standing=standing, groups=PLUMB_LINE.groups, fixed_altitude=fixed)
+
+    def advance(self, until: float, feeds: Mapping[str, Feed], log: Log) -> None:
+        """Take the rows and measurements up to a time, and look back where it is time to."""
+        while self._looks < len(LOOKS) and (at := self.start.time + LOOKS[self._looks]) < until:
+            self._advance(at, feeds, log)
+            self._looks += 1
+            self._look_back(feeds, log)
+        self._advance(until, feeds, log)
+
+    def _advance(self, until: float, feeds: Mapping[str, Feed], log: Log) -> None:
+        """Take the rows and measurements up to a time; rows that come for a time before it are too late."""
+        if self.failure or not self._waiting:
+            return
+        rows = np.vstack(self._waiting)
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]
+        if self._state is None and len(rows) < FIRST:
+            return
+        self._waiting = [rows]
+        if self._state is None:
+            self._begin(rows, feeds)
+        count = int(np.searchsorted(rows[:, 0], until, side="right"))
+        late = int(np.searchsorted(rows[:, 0], self.end, side="right"))
+        if count <= late:
+            return
+        part, self._waiting = rows[late:count], [rows[count:]] if count < len(rows) else []
+        assert self._state is not None
+        setting = self.setting(feeds)
+        try:
+            measured = self._measurements(feeds)
+            samples, disturbances, gaps = self._bridged(part, log)
+            self.gaps += gaps
+            aiding = [*measured, *disturbances, self._noise.growth(part)]
+            self._state, track = go_on(setting, self._state, samples, aiding)
+        except DataError as error:
+            self.failure = str(error)
+            return
+        self._last = part[-1].copy()
+        self.past.add(track)
+        self.siblings.take(setting, samples, aiding, track)
+
+    def _begin(self, rows: Array, feeds: Mapping[str, Feed]) -> None:
+        """Make the loop ready, when enough rows are there to know their interval."""
+        self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
+        setting = self.setting(feeds)
+        time = float(rows[0, 0]) - self._interval
+        self._state = begin(setting, self.start, time, self._interval)
+        if feeds:  # else errors grow as the start says
+            self.siblings.begin(setting, time, self._interval)
+
+    def _look_back(self, feeds: Mapping[str, Feed], log: Log) -> None:
+        """Take all rows so far anew, with errors of aids that last as these rows show them; not where rows were added up."""
+        if self.failure or self._state is None or log.merged > 1:
+            return
+        aids = {key: feed.until(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
+        rows = log.record(self.start.time, self.end)
+        slow, said = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
+        if not slow and not self.slow:
+            return
+        before = vars(self).copy()
+        notes, waiting = self.past.notes, self._waiting
+        taken = np.column_stack([rows.time, rows.gyro, rows.accel])
+        self.slow, self.said = slow, said
+        self._anew()
+        self.past.notes = notes
+        self._waiting = [taken]
+        self._advance(float(rows.time[-1]), feeds, log)
+        self._waiting += waiting
+        if self.failure:  # it broke down with these errors: as before
+            vars(self).update(before)
+
+    def _bridged(self, rows: Array, log: Log) -> tuple[ImuRows, list[Aiding], list[Gap]]:
+        begins = self.end == self.start.time
+        coming = np.sort(np.concatenate([np.empty(0), *(block[:, 0] for block in self._waiting)]))
+        coming = coming[coming > rows[-1, 0]]
+        return bridged(rows, self._last, coming, self._interval, log, begins=begins)
+
+    def _measurements(self, feeds: Mapping[str, Feed]) -> list[Aiding]:
+        """New ones of all feeds; those of a feed whose rows cannot be are left out."""
+        found: list[Aiding] = []
+        for key, feed in feeds.items():
+            try:
+                sent = self._sent.setdefault(key, {})
+                found += feed.measurements(self.altitude, self.mountings.get(key), sent, self.start.time)
+            except DataError as error:
+                self.past.note(key, str(error))
+        return with_slow(found, self.slow)
+
+    def now(self, feeds: Mapping[str, Feed], log: Log) -> tuple[Track, Sequence[Track], float] | None:
+        """One epoch: the loop carried over the rows that wait, which it does not take; siblings there, and how far they were."""
+        if self._state is None:
+            return None
+        setting = self.setting(feeds)
+        waiting = np.vstack(self._waiting) if self._waiting else np.empty((0, 7))
+        waiting = waiting[waiting[:, 0] > self.end]
+        # A gap too long to bridge ends it, unless late rows fill it: the answer holds before it.
+        waiting = unbroken(waiting, self._last, self._interval, begins=self.end == self.start.time)
+        samples, found = None, self.past.last
+        if len(waiting) and not self.failure:
+            samples, disturbances, _ = self._bridged(waiting, log)
+            found = go_on(setting, self._state, samples, disturbances, last=True)[1][-1:]
+        if found is None:
+            return None
+        return found, self.siblings.now(setting, float(found.time[0]), samples), self.siblings.most
+
+    def settle(self, feeds: Mapping[str, Feed]) -> None:
+        """Let the loops of other starts take all that this one has taken."""
+        if self._state is not None:
+            self.siblings.settle(self.setting(feeds))
