@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 
 import truenorth
-from truenorth.alignment.in_motion_hidden import HELD, about_zero, hidden_from
+from truenorth.alignment.in_motion_hidden import HELD, hidden_from
 from truenorth.alignment.in_motion_passes import turn_between
 from truenorth.alignment.in_motion_start import guesses_all_round
 from truenorth.alignment.in_motion_task import moving_task
-from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import simulate, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.simulation.odometer import OdometerSpec
-from truenorth.state.layout import Layout
-from truenorth.state.track import Track
 
 SPAN, SPEED = 120.0, 12.0
 PLACE = Position.from_degrees(40.0, 10.0, 100.0)
@@ -77,35 +75,6 @@ def test_gyros_that_hide_the_earths_rate(imu, hidden):
     """By noise and slow parts of their biases: what is constant in the body parts from the earth's rate in turns."""
     _, record, odometer = logs(0, imu)
     assert hidden_from(task_of(record, odometer, imu)) is hidden
-
-
-def test_a_prior_about_zero_counts_once():
-    """Against the dense joint Gaussian: measurements of all states, biases that begin about a centre or about zero."""
-    rng = np.random.default_rng(5)
-    sigma = np.concatenate([np.full(9, 1e-4), np.full(3, 0.2), np.full(3, 0.5)])
-    H, truth = rng.standard_normal((12, 15)), sigma * rng.standard_normal(15)
-    noise, centre = 0.3, 0.8 * sigma[9:] * rng.standard_normal(6)
-    z = H @ truth + noise * rng.standard_normal(12)
-
-    def posterior(mean):
-        P = np.linalg.inv(np.diag(sigma**-2) + H.T @ H / noise**2)
-        return mean + P @ H.T @ (z - H @ mean) / noise**2, P
-
-    found, P = posterior(np.concatenate([np.zeros(9), centre]))
-    wanted, _ = posterior(np.zeros(15))
-    given = about_zero(track_of(found, P), centre, sigma[9:] ** 2)
-    moved = track_of(wanted, P)
-    np.testing.assert_allclose(given.C_nb, moved.C_nb, atol=1e-7)
-    np.testing.assert_allclose(given.v_n, moved.v_n, atol=1e-12)
-    np.testing.assert_allclose(given.sensors, moved.sensors, atol=1e-12)
-    assert np.abs(found - wanted)[9:].max() > 0.1 * sigma[9:].max()
-
-
-def track_of(x, P):
-    """A track of one epoch whose errors (true attitude and biases less the assumed, velocity the other way) are these."""
-    C = dcm_from_rotation_vector(x[:3])[None]
-    sensors = np.concatenate([np.zeros(9), x[9:]])[None]
-    return Track(np.zeros(1), C, -x[None, 3:6], np.zeros((1, 3)), sensors, P[None], Layout(), ())
 
 
 @pytest.mark.slow

@@ -8,29 +8,32 @@ that passes for knowledge of both. A consumer IMU that drove S-turns knew its le
 Of one that hardly turns level is that of gravity (:mod:`truenorth.alignment.in_motion_level`). Where the log speaks against that,
 the heading is held: it is where north shall be, not an error. A pass so held finds level and biases as the turns between them
 tell, and the passes go on until the level that the next begins with is the one that it leads back to. Each is linear about the
-biases of the one before. That they are about zero, as the specification says, is given to its end, so that it counts once: passes
-that begin about what was found, with the sigma of the specification, go as far from zero as the log lets them. What the earth's
-rate does tell of heading, and what a wrong one does to level, is then read from passes held at headings all round (ours).
+biases of the one before, and hardly leaves them: a loop that finds its gyros' biases anew turns its heading, and takes that for a
+turn. What so narrow a beginning says is taken off at the end, and that biases are about zero, as the specification says, put in its
+place (:mod:`truenorth.alignment.in_motion_narrow`). What the earth's rate does tell of heading, and what a wrong one does to level,
+is then read from passes held at headings all round (ours).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.in_motion_level import with_level_biases
+from truenorth.alignment.in_motion_narrow import Narrowed, as_found
 from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import HEADINGS, Guess, led_back
 from truenorth.alignment.in_motion_task import MovingTask
-from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import misfit
-from truenorth.state.layout import BA, BG, DV, PHI
+from truenorth.state.layout import BA, BG, PHI
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -86,13 +89,20 @@ def of_level(task: MovingTask, found: Pass, first: Guess, spread: Spread) -> tup
     return task, last.guess, last.track, all_round.and_more(shown_by_the_earth(task))
 
 
+class _Held(NamedTuple):
+    """A pass that held a heading, and minus twice its log-likelihood but for a constant."""
+
+    of: Pass
+    cost: float
+
+
 def _with_heading_held(task: MovingTask, found: Pass, first: Guess) -> tuple[Pass, Spread] | None:
     """The last of the passes that hold a heading, and what headings all round say; None where level does not settle."""
     try:
         last = _held(task, replace(found.guess, heading_sigma=HELD))
         for _ in range(MOST):
-            before, last = last, _held(task, _led_on(last, task, first))
-            if _moved(before.track, last.track) < SETTLED:
+            before, last = last, _held(task, _led_on(last.of, task, first))
+            if _moved(before.of.track, last.of.track) < SETTLED:
                 return _of_all_round(task, last)
     except DataError:  # the filter broke down
         pass
@@ -100,37 +110,23 @@ def _with_heading_held(task: MovingTask, found: Pass, first: Guess) -> tuple[Pas
 
 
 def _led_on(last: Pass, task: MovingTask, first: Guess) -> Guess:
-    """Where the next pass begins: about all the biases that the last one found."""
-    guess = led_back(last.track, last.back, task.spec, first)
-    bias, nabla = last.track.gyro_bias[-1], last.track.accel_bias[-1]
-    return replace(guess, heading_sigma=HELD, gyro_bias=bias, accel_bias=nabla)
+    """Where the next pass begins: about all the biases that the last one found, more narrowly than it knows them."""
+    track = last.track
+    return replace(
+        led_back(track, last.back, task.spec, first),
+        heading_sigma=HELD,
+        gyro_bias=track.sensors[-1, BG],
+        accel_bias=track.sensors[-1, BA],
+        bias_variance=as_found(task, track),
+    )
 
 
-def _held(task: MovingTask, guess: Guess) -> Pass:
-    centre = np.concatenate([guess.gyro_bias, guess.accel_bias])
-    return begun(task, guess, about_zero(task.run(guess, gated=True), centre, task.spec.constant_variance))
-
-
-def about_zero(track: Track, centre: Array, variance: Array) -> Track:
-    """A track that began with biases about a centre, as if it had begun with them about zero.
-
-    The prior's density about zero is that about b, times ``exp(-b' x / sigma^2)`` and a constant, x the error of b: linear in x. So
-    covariances stay as they are, and each state moves by its covariance with the biases times ``-b / sigma^2``.
-
-    Parameters
-    ----------
-    track : Track
-    centre : (6,) array
-        Biases of gyros and accelerometers that it began about, SI.
-    variance : (6,) array
-        That it began with.
-    """
-    pull = np.divide(-centre, variance, out=np.zeros(6), where=variance > 0.0)
-    x = track.P[:, :, BG.start : BA.stop] @ pull
-    C_nb = np.stack([dcm_from_rotation_vector(phi) @ C for phi, C in zip(x[:, PHI], track.C_nb, strict=True)])
-    sensors = track.sensors.copy()
-    sensors[:, BG.start :] += x[:, BG.start :]
-    return replace(track, C_nb=C_nb, v_n=track.v_n - x[:, DV], sensors=sensors)
+def _held(task: MovingTask, guess: Guess) -> _Held:
+    wide = task.spec.constant_variance
+    narrow = wide if guess.bias_variance is None else guess.bias_variance
+    prior = Narrowed(np.concatenate([guess.gyro_bias, guess.accel_bias]), narrow, wide)
+    track = task.run(guess, gated=True)
+    return _Held(begun(task, guess, prior.taken_off(track)), misfit(track.residuals) + prior.misfit(track))
 
 
 def _moved(before: Track, after: Track) -> float:
@@ -140,20 +136,20 @@ def _moved(before: Track, after: Track) -> float:
     return float(np.max(np.abs(tilt) / sigma))
 
 
-def _of_all_round(task: MovingTask, last: Pass) -> tuple[Pass, Spread]:
+def _of_all_round(task: MovingTask, last: _Held) -> tuple[Pass, Spread]:
     """The best of passes held at headings all round, and the spread of those that explain the log as well."""
-    held = [last]
+    held, guess = [last], last.of.guess
     for k in range(1, HEADINGS):
         turn = dcm_from_euler(2.0 * math.pi * k / HEADINGS, 0.0, 0.0)
         try:
-            held.append(_held(task, replace(last.guess, C_nb=turn @ last.guess.C_nb)))
+            held.append(_held(task, replace(guess, C_nb=turn @ guess.C_nb)))
         except DataError:  # the filter breaks down: this heading is none
             continue
-    cost = np.array([misfit(each.track.residuals) for each in held])
+    cost = np.array([each.cost for each in held])
     weight = np.exp(-0.5 * (cost - cost.min()))
     best = int(np.argmin(cost))
-    spread = Spread.of([each.track.C_nb[-1] for each in held], best, weight / weight.sum())
-    return held[best], spread.and_more(2.0 * math.pi / HEADINGS / math.sqrt(12.0))
+    spread = Spread.of([each.of.track.C_nb[-1] for each in held], best, weight / weight.sum())
+    return held[best].of, spread.and_more(2.0 * math.pi / HEADINGS / math.sqrt(12.0))
 
 
 def _by_gravity(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Guess, Track] | None:

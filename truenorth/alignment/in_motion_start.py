@@ -42,13 +42,17 @@ ODOMETER_START, GNSS_START, UNKNOWN_START = 0.3, 0.3, 5.0  # m/s, one sigma of t
 
 @dataclass(frozen=True)
 class Guess:
-    """Attitude at the beginning of the first sample, its sigmas, rad, and the biases about which errors are linear, SI."""
+    """Attitude at the beginning of the first sample, its sigmas, rad, and the biases about which errors are linear, SI.
+
+    `bias_variance` (6,) is that of their constant part; None: as the specification says.
+    """
 
     C_nb: Array
     level_sigma: float
     heading_sigma: float
     gyro_bias: Array = field(default_factory=lambda: np.zeros(3))
     accel_bias: Array = field(default_factory=lambda: np.zeros(3))
+    bias_variance: Array | None = None
 
 
 def coarse_guess(
@@ -140,7 +144,8 @@ def start_at(
         sigma = math.hypot(sigma, _swing(record, antenna))
     # Slow parts of the biases are states of their own.
     angles = guess.level_sigma, guess.level_sigma, guess.heading_sigma
-    P = prior_covariance(angles, sigma, position.sigma, spec.constant_variance)
+    variance = spec.constant_variance if guess.bias_variance is None else guess.bias_variance
+    P = prior_covariance(angles, sigma, position.sigma, variance)
     if by_wheel:  # what the wheel says turns with the attitude: dv = dv_I + v x phi
         turn = np.eye(STATES)
         turn[DV, PHI] = skew(v_n)

@@ -25,7 +25,7 @@ from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.errors.group import Group, columns
 from truenorth.errors.ins import TURN_TIME
 from truenorth.records.specs import ImuSpec
-from truenorth.state.layout import ACCEL_AXES, BA, GYRO_AXES, SLOW_ACCEL
+from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, SLOW_ACCEL, Layout
 from truenorth.state.now import NOW_C, NOW_FORCE_B, NOW_MEAN_RATE, NOW_SINCE, matrix_of, vector_of
 from truenorth.state.track import Track
 
@@ -138,17 +138,29 @@ def proper_bias(track: Track, force: ArrayLike, acting: ArrayLike) -> tuple[Arra
     bias, sigma : (K, 3) arrays, m/s^2
     """
     layout = track.layout
-    J = np.zeros((3, layout.states))
-    J[:, BA] = np.eye(3)
+    J = constant_biases(layout, force)[3:]
     if (slow := layout.slice_of(SLOW_ACCEL)) is not None:
         J[:, slow] = np.eye(3)
-    unseen = np.asarray(acting, dtype=np.float64)
-    if (own := layout.slice_of(ACCEL_AXES)) is not None:
-        unseen = np.zeros(3)
-        for i in range(3):
-            J[i, own.start + 3 * i : own.start + 3 * i + 3] = -np.asarray(force)
+    unseen = np.asarray(acting, dtype=np.float64) * (layout.slice_of(ACCEL_AXES) is None)
     variance = np.einsum("ij,kjl,il->ki", J, track.P, J)
     return track.sensors @ J.T, np.sqrt(np.maximum(variance, 0.0) + unseen)
+
+
+def constant_biases(layout: Layout, force: ArrayLike) -> Array:
+    """(6, n) what of the states is the constant part of the biases of gyros and accelerometers, these without ``M_a f0``.
+
+    Parameters
+    ----------
+    layout : Layout
+    force : (3,) array, m/s^2
+        ``f0``.
+    """
+    J = np.zeros((6, layout.states))
+    J[:, BG.start : BA.stop] = np.eye(6)
+    if (own := layout.slice_of(ACCEL_AXES)) is not None:
+        for i in range(3):
+            J[3 + i, own.start + 3 * i : own.start + 3 * i + 3] = -np.asarray(force)
+    return J
 
 
 def known_as_bias(P: Array, values: Array, group: Group, first: int, constant: ArrayLike | None) -> tuple[Array, Array]:
