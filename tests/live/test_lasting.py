@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from tests.live.test_siblings import SWELL, Anchored
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
-from truenorth.live import Navigator, loop
+from truenorth.live import Navigator, lasting, loop
 from truenorth.live.lasting import lasting_errors
 from truenorth.navigation import navigate
 from truenorth.state.layout import DV
@@ -60,7 +60,7 @@ def test_velocity_is_as_unsure_as_errors_that_last_leave_it(monkeypatch):
     """Four runs of 30 answers that are not independent: RMS scatters by some 0.2."""
     seeds = (1, 2, 3, 4)
     assert (rms_of_velocity(seeds) < 1.45).all()
-    monkeypatch.setattr(loop, "LOOKS", ())
+    monkeypatch.setattr(loop, "FIRST_LOOK", np.inf)
     assert rms_of_velocity(seeds).max() > 1.6
 
 
@@ -135,3 +135,10 @@ def test_a_run_whose_rows_are_added_up_looks_back_no_more():
     answers = case.feed(run, 25, every=5.0)
     assert run.log.merged > 1
     assert np.abs(case.off_velocity(answers)).max() < 5.0
+
+
+def test_looks_go_on_until_each_aid_had_rows_enough():
+    times = [lasting.FIRST_LOOK]
+    while np.isfinite(times[-1]) and times[-1] < 1e4:
+        times.append(lasting.next_look(times[-1], times[-1] > 500.0))
+    assert times == [5.0, 75.0, 150.0, 300.0, 600.0, np.inf]

@@ -8,7 +8,9 @@ velocity of an answer: it was up to 5 sigmas off.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +30,24 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.state import Start
 
-LOOKS = (5.0, 75.0, 150.0, 300.0, 600.0)  # s after the start
+FIRST_LOOK, SECOND, ENOUGH = (
+    5.0,
+    75.0,
+    300.0,
+)  # s after the start; no more looks beyond the last, if all aids had rows enough
+
+
+class Seen(NamedTuple):
+    """What a look shows."""
+
+    slow: Slow  # errors of aids that last, by their sources' names
+    said: list[Evidence]  # of them
+    enough: bool  # whether each source had rows enough
+
+
+def next_look(after: float, enough: bool) -> float:
+    """When the look comes that follows one, s after the start; infinity: never."""
+    return math.inf if enough and after >= ENOUGH else max(SECOND, 2.0 * after)
 
 
 def lasting_errors(
@@ -38,8 +57,8 @@ def lasting_errors(
     altitude: Altitude,
     spec: ImuSpec,
     aids: Mapping[str, Aid | None],
-) -> tuple[Slow, list[Evidence]]:
-    """Errors of aids that last, by their sources' names, and what is to be said of them.
+) -> Seen:
+    """Errors of aids that last, and what is to be said of them.
 
     Parameters
     ----------
@@ -60,16 +79,17 @@ def lasting_errors(
     receiver = given.get(Gnss.key)
     if isinstance(receiver, Gnss) and receiver.mounting is not None and receiver.mounting.bias_sigma is not None:
         unseen.pop(FIXES, None)
-    if all(_seconds(source) < LEAST_ROWS for source in sources):
-        return unseen, []
+    short = [_seconds(source) < LEAST_ROWS for source in sources]
+    if all(short):
+        return Seen(unseen, [], not sources and len(given) == len(aids))
     try:
         record, _, disturbances = bridge_gaps(record)
         every = max(1, round(1.0 / FINE))
         plan = Plan(record, start, model, altitude, disturbances, FINE, every, axis_sigma(spec)[0].max())
         plan, _, said = with_slow_errors(plan, given, plan.run(plan.sources(given)))
     except (DataError, UsageError):  # the loop itself says what is wrong
-        return unseen, []
-    return {**unseen, **plan.slow}, said
+        return Seen(unseen, [], enough=False)
+    return Seen({**unseen, **plan.slow}, said, not any(short) and len(given) == len(aids))
 
 
 def _seconds(source: Aiding) -> int:

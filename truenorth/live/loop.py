@@ -19,7 +19,7 @@ from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.bridges import Gap, bridged, unbroken
 from truenorth.live.feed import Feed
-from truenorth.live.lasting import LOOKS, lasting_errors
+from truenorth.live.lasting import FIRST_LOOK, lasting_errors, next_look
 from truenorth.live.log import Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
@@ -76,7 +76,7 @@ class Loop:
         self.failure = ""
         self.slow: Slow = {}  # errors of aids that last, as the last look has found them
         self.said: list[Evidence] = []
-        self._looks = 0
+        self._look = FIRST_LOOK  # s after the start, when it looks back next
         self._waiting: list[Array] = []
         self._anew()
 
@@ -127,10 +127,9 @@ class Loop:
 
     def advance(self, until: float, feeds: Mapping[str, Feed], log: Log) -> None:
         """Take the rows and measurements up to a time, and look back where it is time to."""
-        while self._looks < len(LOOKS) and (at := self.start.time + LOOKS[self._looks]) < until:
+        while (at := self.start.time + self._look) < until:
             self._advance(at, feeds, log)
-            self._looks += 1
-            self._look_back(feeds, log)
+            self._look = next_look(self._look, self._look_back(feeds, log))
         self._advance(until, feeds, log)
 
     def _advance(self, until: float, feeds: Mapping[str, Feed], log: Log) -> None:
@@ -173,15 +172,20 @@ class Loop:
         if feeds:  # else errors grow as the start says
             self.siblings.begin(setting, time, self._interval)
 
-    def _look_back(self, feeds: Mapping[str, Feed], log: Log) -> None:
-        """Take all rows so far anew, with errors of aids that last as these rows show them; not where rows were added up."""
-        if self.failure or self._state is None or log.merged > 1:
-            return
+    def _look_back(self, feeds: Mapping[str, Feed], log: Log) -> bool:
+        """Take all rows so far anew, with errors of aids that last as these rows show them; whether there is no more to be seen.
+
+        Not where rows were added up.
+        """
+        if self.failure or log.merged > 1 or not feeds:
+            return True
+        if self._state is None:
+            return False
         aids = {key: feed.until(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
         rows = log.record(self.start.time, self.end)
-        slow, said = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
+        slow, said, enough = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
         if not slow and not self.slow:
-            return
+            return enough
         before = vars(self).copy()
         notes, waiting = self.past.notes, self._waiting
         taken = np.column_stack([rows.time, rows.gyro, rows.accel])
@@ -193,6 +197,7 @@ class Loop:
         self._waiting += waiting
         if self.failure:  # it broke down with these errors: as before
             vars(self).update(before)
+        return enough
 
     def _bridged(self, rows: Array, log: Log) -> tuple[ImuRows, list[Aiding], list[Gap]]:
         begins = self.end == self.start.time
