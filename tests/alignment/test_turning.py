@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from benchmarks.honesty.harness import outcome
+from benchmarks.honesty.turning import CASES
 from tests import recordings
 from tests.runs import few_and_all, some
 from truenorth.alignment import align
@@ -188,3 +190,11 @@ def test_a_base_that_is_nudged_has_no_gyro_that_steps():
     record = scenario.simulate(seed=3, run=0).record
     answer = align(record, PLACE, scenario.imu)
     assert all(item.key != "bias.vertical_steps" for item in answer.evidence), answer.reasons
+
+
+def test_passes_that_walk_away_from_a_good_place_leave_the_answer_there():
+    """One log of a table, no specification: the first passes are 15 in the logarithm likelier than the last; level was refused."""
+    case = next(case for case in CASES if case.name == "turntable, low cost, no specification")
+    found = outcome(case, 94001, 12)
+    assert not found.refused
+    assert np.abs(found.ratios["level"]).max() < 3.0

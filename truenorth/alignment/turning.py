@@ -257,6 +257,13 @@ class _Pass(NamedTuple):
         return np.asarray((dcm_from_rotation_vector(self.found.end[PHI]) @ C)[2])
 
 
+def _likelier(one: _Pass | None, other: _Pass | None) -> bool:
+    """Whether a pass is likelier than another by more than chance; any is likelier than none."""
+    if one is None or other is None:
+        return one is not None
+    return one.log_likelihood - other.log_likelihood > 0.5 * limit("rival")
+
+
 class _Passes:
     """The passes over a log: the likeliest of them, and how far they agree on the vertical.
 
@@ -286,10 +293,12 @@ class _Passes:
         return by
 
     def best(self, *, at_rest: bool) -> _Pass:
-        """The last pass, or one that is likelier than by chance; where passes came to rest, one that moves level little."""
-        likeliest = self.near if at_rest else self.any
-        clearly = likeliest is not None and likeliest.log_likelihood - self.last.log_likelihood > 0.5 * limit("rival")
-        return likeliest if likeliest is not None and clearly else self.last
+        """The last pass, or one that is likelier than by chance; one that moves level little, unless passes went round elsewhere.
+
+        Of two that are as likely but for chance, the one that moves level little is nearer to a place of rest.
+        """
+        likeliest = self.near if at_rest or not _likelier(self.any, self.near) else self.any
+        return likeliest if likeliest is not None and _likelier(likeliest, self.last) else self.last
 
     def scatter(self, best: _Pass) -> float:
         """Variance of the level of passes about the best, each as likely as it is, and of what that moves: an axis, rad^2."""
