@@ -54,6 +54,20 @@ def test_a_row_that_holds_a_gap_is_as_long_as_that_and_no_spike():
     assert np.abs(mended.accel - record.accel)[at, 0].max() < 0.002
 
 
+def test_a_spike_in_the_row_before_a_gap_is_one():
+    """The bridge holds a half of it for each row that is lost: two rows in a row stood out, which are no single ones."""
+    rates = shaken(np.random.default_rng(5))
+    keep = np.ones(ROWS, dtype=bool)
+    for row in (500, 1500, 3000):
+        keep[row : row + 3] = False
+    sound = ImuRecord(TIME[keep], rates.gyro[keep] * 0.02, rates.accel[keep] * 0.02, "increments")
+    accel = sound.accel.copy()
+    accel[sound.gaps - 1, 0] += 0.012
+    mended, count = without_spikes(across_gaps(replace(sound, accel=accel)))
+    assert count == 3
+    assert np.abs(mended.accel - across_gaps(sound).accel).max() < 0.004
+
+
 @pytest.mark.parametrize("true", [False, True])
 def test_knocks_that_the_measurements_show_are_left(true):
     """Velocities follow the sum of the rows: with those that are true, or without."""

@@ -104,6 +104,10 @@ def test_rows_that_are_stamped_late_are_no_gaps():
     assert run._loop.gaps == []
     assert sum(r.rejected for r in run.residuals) == 0
     assert np.abs(case.off_velocity(answers)).max() < 4.0
+    whole = navigate(case.log, case.start, aid=case.aid, imu=case.spec, interval=0.2, output=1.0)
+    assert (whole.status, whole.gaps) == ("navigated", ())
+    off = whole.v_n - case.motion.states(whole.time).v_n
+    assert np.abs(off / whole.track.sigma[:, DV]).max() < 4.0
 
 
 def test_stamps_of_milliseconds_make_no_gaps():

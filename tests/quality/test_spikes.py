@@ -168,3 +168,18 @@ def test_a_row_that_is_as_long_as_those_lost_before_it_is_no_spike(kind):
     lost = replace(same, time=same.time[keep], gyro=same.gyro[keep], accel=same.accel[keep])
     assert lost.gaps.size
     assert spikes_evidence(across_gaps(lost), inputs["place"].lat) == []
+
+
+def test_spikes_in_rows_before_gaps_count_in_full():
+    """The bridges have a part of them, which made them seem smaller by a fifth."""
+    inputs, _ = BENCHES["still"].draw(12, 0)
+    record = inputs["record"]
+    keep = np.ones(len(record), dtype=bool)
+    keep[500::700] = False
+    lost = replace(record, time=record.time[keep], gyro=record.gyro[keep], accel=record.accel[keep])
+    accel, size = lost.accel.copy(), 200.0 * np.std(lost.accel[:, 0])
+    accel[lost.gaps - 1, 0] += size
+    (found,) = spikes_evidence(across_gaps(replace(lost, accel=accel)), inputs["place"].lat)
+    assert found.figures["count"] >= len(lost.gaps) > 10
+    mean = len(lost.gaps) * size / len(lost) / lost.interval
+    assert found.effect.level == pytest.approx(mean / 9.8, rel=0.03)

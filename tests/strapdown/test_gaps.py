@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from truenorth.live.bridges import bridged
+from truenorth.live.log import Log
 from truenorth.records import ImuRecord
 from truenorth.strapdown.increments import across_gaps, without_gaps
 
@@ -38,3 +40,65 @@ def test_rates_and_even_clocks_stay_as_they_are():
     rates = replace(ramp(), kind="rates")
     assert across_gaps(rates) is rates
     np.testing.assert_array_equal(across_gaps(ramp()).gyro, ramp().gyro)
+
+
+EVEN = 0.02 * np.arange(1.0, 401.0)
+
+
+def at_rest(time):
+    """A record of increments whose rows are stamped so."""
+    rows = np.tile([0.0, 0.0, 0.196], (len(time), 1))
+    return ImuRecord(time, 0.0 * rows, rows, "increments")
+
+
+@pytest.mark.parametrize("by", [0.51, 0.75, 0.95])
+def test_a_row_that_is_stamped_late_follows_no_gap(by):
+    """The clock comes back with the next row; of the last one nothing says so, and one lost row would make it later."""
+    time = EVEN.copy()
+    time[[100, 200, 201, 300]] += by * 0.02
+    assert not at_rest(time).gaps.size
+    time[-1] += 0.8 * 0.02
+    assert not at_rest(time).gaps.size
+    time[-1] = EVEN[-1] + 0.02
+    assert at_rest(time).gaps.tolist() == [399]
+
+
+@pytest.mark.parametrize("lost", [1, 2, 30])
+def test_a_lost_row_is_one_where_others_are_late_too(lost):
+    keep = np.ones(400, dtype=bool)
+    keep[200 : 200 + lost] = False
+    time = EVEN + 0.6 * 0.02 * (np.arange(400) % 20 == 7)
+    assert at_rest(time[keep]).gaps.tolist() == [200]
+
+
+def test_a_clock_that_jumps_has_a_gap():
+    time = EVEN.copy()
+    time[200:] += 0.6 * 0.02
+    assert at_rest(time).gaps.tolist() == [200]
+
+
+@pytest.mark.parametrize("rate", [400.0, 300.0, 160.0])
+def test_stamps_of_milliseconds_make_no_gaps(rate):
+    """Of 400 rows a second steps of 2 and 3 ms. A lost row is one all the same."""
+    time = np.round(np.arange(1.0, 4001.0) / rate + 0.0004, 3)
+    assert not at_rest(time).gaps.size
+    assert at_rest(np.delete(time, 2000)).gaps.tolist() == [2000]
+
+
+@pytest.mark.parametrize("lost", [[100, 102], [100, 103, 105], [100, 101, 104]])
+def test_rows_that_are_lost_one_after_the_other_are_gaps_each(lost):
+    time = np.delete(EVEN, lost)
+    expected = np.flatnonzero(np.diff(time) > 0.03) + 1
+    assert at_rest(time).gaps.tolist() == expected.tolist()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_whole_log_and_a_running_one_have_the_same_gaps(seed):
+    rng = np.random.default_rng(seed)
+    late = 0.02 * rng.uniform(0.3, 0.95, 400) * (rng.random(400) < 0.05)
+    time = (EVEN + late)[(rng.random(400) > 0.02) | (np.arange(400) < 10)]
+    record, log = at_rest(time), Log("increments")
+    rows = np.hstack([time[:, None], record.gyro, record.accel])
+    log.add(rows)
+    _, _, gaps = bridged(rows[1:], rows[0], np.empty(0), record.interval, log, begins=False)
+    assert [before for before, _ in gaps] == time[record.gaps - 1].tolist()

@@ -54,5 +54,11 @@ def sway_inferred(
 
 
 def _explained(fine: SwayAlignment) -> float:
-    """Twice the logarithm of the likelihood of a log, with the best of all that may have begun in it."""
-    return 2.0 * float(fine.estimates.log_likelihood) + best_bias(fine)
+    """Twice the logarithm of the likelihood of a log, with the best of all that may have begun in it, where that is found.
+
+    What is no more than a hint is no part of the answer, and must not make it the likeliest: people who stepped aboard a boat moved
+    her as a bias that changes does (23 of 25), and with constant biases, that were so preferred to those of datasheets by 1, level
+    was 4.8 sigmas off.
+    """
+    begun = best_bias(fine)
+    return 2.0 * float(fine.estimates.log_likelihood) + (begun if begun > limit("drift") else 0.0)

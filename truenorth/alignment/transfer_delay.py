@@ -42,10 +42,14 @@ class Found(NamedTuple):
     sure: bool  # the correlation is high, no chance, and the only one
     gain: float = 0.0  # log-likelihood of the agreement at that shift
     shared: float = 0.0  # changes of motion that both logs show there: sum of their products
+    agree: bool = False  # the correlation is high and no chance, whether it is the only one or not
 
 
 def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored: bool = False) -> Found:
-    """Find the delay of a master by correlation, of all at which both logs have 10 s in common.
+    """Find the delay of a master by correlation, the likeliest of all at which both logs have 10 s in common.
+
+    Where a manoeuvre lies upon the next one, logs agree as well as where all lie upon themselves, or by chance better, but have
+    less in common: it is the likelihood of an agreement that says how much it is worth.
 
     Parameters
     ----------
@@ -65,31 +69,32 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored:
     kind, step, a, b, shifts, score, common = both
     # Shift k puts row j of the master on row j + k of the slave: delay = (start of master) - (start of slave) - k step.
     offset = float(master.time[0] - slave.time[0])
-    k = int(np.argmax(score))
+    gains = _gains(score, common) * step / WINDOW[kind] * a.shape[1]
+    near = np.abs(shifts - shifts[int(np.argmax(gains))]) * step <= WINDOW[kind]
+    k = int(np.argmax(np.where(near, score, -np.inf)))  # a row more in common is no better agreement
     peak = float(score[k])
     fraction, _ = _peak(score, k)
     elsewhere = np.abs(shifts - shifts[k]) * step > 2.0 * WINDOW[kind]
     rival = float(np.max(score[elsewhere], initial=0.0))
     independent = float(common[k]) * step / WINDOW[kind] * a.shape[1]
-    better = 0.5 * independent * math.log(max(1.0 - rival**2, 1e-12) / max(1.0 - peak**2, 1e-12))
+    better = float(gains[k] - np.max(gains[elsewhere], initial=0.0))
     lasting = min(_lasting(a), _lasting(b)) * step > FEWEST * WINDOW[kind]
-    sure = lasting and peak > max(SURE, CHANCE / math.sqrt(independent)) and better > UNIQUE
+    agree = lasting and peak > max(SURE, CHANCE / math.sqrt(independent))
     shared = _changes(a, b, round(shifts[k]), max(1, round(WINDOW[kind] / step)))
-    gain = -0.5 * independent * math.log(max(1.0 - peak**2, 1e-12))
-    return Found(float(offset - step * (shifts[k] + fraction)), peak, rival, sure, gain, shared)
+    return Found(
+        float(offset - step * (shifts[k] + fraction)),
+        peak,
+        rival,
+        agree and better > UNIQUE,
+        float(gains[k]),
+        shared,
+        agree,
+    )
 
 
-def likeliest_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> float:
-    """Delay (s) at which agreement and what both logs have in common make the likeliest of all; NaN where they are too short.
-
-    Where a manoeuvre lies upon the next one logs agree as well as where all lie upon themselves, but have less in common.
-    """
-    both = _compared(slave, master, C_mb)
-    if both is None:
-        return math.nan
-    _, step, _, _, shifts, score, common = both
-    k = int(np.argmin(common * np.log(np.maximum(1.0 - np.maximum(score, 0.0) ** 2, 1e-12))))
-    return float(master.time[0] - slave.time[0] - step * shifts[k])
+def _gains(score: Array, common: Array) -> Array:
+    """Log-likelihood of the agreement of so many independent values, at each shift, over that of unrelated signals."""
+    return np.asarray(-0.5 * common * np.log(np.maximum(1.0 - np.maximum(score, 0.0) ** 2, 1e-12)))
 
 
 def delay_by_arm(slave: ImuRecord, master: MasterRecord, arm: Array, sigma: float) -> float:

@@ -15,7 +15,6 @@ from truenorth.alignment.transfer_delay import (
     agreement,
     delay_by_arm,
     find_delay,
-    likeliest_delay,
     runs_backwards,
 )
 from truenorth.alignment.transfer_filter import Assumed
@@ -88,12 +87,10 @@ def _again(slave: ImuRecord, master: MasterRecord, assumed: Assumed, found: Foun
     """Whether the motion that agrees at a delay far from the one that was said comes again, and the log belongs where it was said.
 
     Manoeuvres that come again agree as well with the next ones, and rows of a second or stamps that scatter make it a matter of
-    chance where best. So a log belongs where it was said if it agrees there about as well; or if the delay at which agreement and
-    what both logs have in common are the likeliest is near that. By how much the delay is off then, the filter asks.
+    chance where best. So a log belongs where it was said if it agrees there about as well. By how much the delay is off then, the
+    filter asks.
     """
-    if _left(slave, master, assumed.C_mb, assumed.delay) < MISFIT * (1.0 - found.correlation**2):
-        return True
-    return abs(likeliest_delay(slave, master, assumed.C_mb) - assumed.delay) < AGAIN
+    return _left(slave, master, assumed.C_mb, assumed.delay) < MISFIT * (1.0 - found.correlation**2)
 
 
 def _unbroken(master: MasterRecord) -> MasterRecord:
@@ -123,15 +120,15 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: fl
     if min(map(len, parts)) < 2:
         return None
     found = [find_delay(slave, part, C_mb) for part in parts]
-    if not all(part.sure for part in found):
+    if not all(part.agree for part in found):
         return None
-    begin, end = (_likely(slave, part, C_mb, one.delay) for part, one in zip(parts, found, strict=True))
+    begin, end = (part.delay for part in found)
     if abs(end - begin) < shortest:
         return None
-    # What comes again and again, such as a sea or a rotor, agrees at many delays, and chance says which is best: one that fits
-    # both parts is that of the clock.
+    # What comes again and again, such as turns, a sea or a rotor, agrees at many delays, and chance says which is best: one that
+    # fits both parts is that of the clock.
     own = [_left(slave, part, C_mb, one) for part, one in zip(parts, (begin, end), strict=True)]
-    for one in (begin, end, likeliest_delay(slave, _unbroken(master), C_mb)):
+    for one in (begin, end, delay, find_delay(slave, _unbroken(master), C_mb).delay):
         if all(_left(slave, part, C_mb, one) < MISFIT * least for part, least in zip(parts, own, strict=True)):
             return None
     return contradiction(
@@ -143,16 +140,6 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: fl
         after=end,
         since=float(master.time[last]),
     )
-
-
-def _likely(slave: ImuRecord, part: MasterRecord, C_mb: Array, found: float) -> float:
-    """Delay of a part, s: that at which it agrees best, or the likeliest where that is another one.
-
-    A turn at the end of the slave's log agrees with the first rows of a part as well as with a turn of its own: these alone are
-    compared there, and how rows a good part of a second apart lie in a turn says which is better.
-    """
-    likeliest = likeliest_delay(slave, part, C_mb)
-    return likeliest if abs(likeliest - found) > AGAIN else found
 
 
 def _left(slave: ImuRecord, part: MasterRecord, C_mb: Array, delay: float) -> float:

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import effect_of, last_sizes, likelihood_ratio, rival
-from truenorth.quality.spikes import rows_held, spikes_of
+from truenorth.quality.spikes import spikes_of
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.judge import weight
 from truenorth.state.limits import limit
 from truenorth.state.track import Track
+from truenorth.strapdown.increments import across_gaps, of_own_intervals
 
 Array = NDArray[np.float64]
 
@@ -29,24 +30,24 @@ Array = NDArray[np.float64]
 def without_spikes(record: ImuRecord) -> tuple[ImuRecord, int]:
     """The record with spikes replaced by what their neighbours say, and how many there were.
 
-    A row of increments that holds a gap as well is as long as that: its mean rate is compared.
+    Rows of increments are compared without the gaps that they hold: a gap has a part of a spike in the row before it.
     """
-    rows = rows_held(record)
-    gyro, accel = ([_mended(x, rows, record.interval) for x in sensor.T] for sensor in (record.gyro, record.accel))
+    sensors = of_own_intervals(record)
+    gyro, accel = ([_mended(x, record.interval) for x in sensor.T] for sensor in sensors)
     count = sum(number for _, number in (*gyro, *accel))
     if count == 0:
         return record, 0
     turns, forces = (np.stack([x for x, _ in sensor], axis=1) for sensor in (gyro, accel))
-    return replace(record, gyro=turns, accel=forces), count
+    return across_gaps(replace(record, gyro=turns, accel=forces)), count
 
 
-def _mended(values: Array, rows: Array, interval: float) -> tuple[Array, int]:
-    """A channel (N,) without spikes, and their number; `rows` (N,): how many rows each value holds."""
-    at, said = spikes_of(values / rows, interval)
+def _mended(values: Array, interval: float) -> tuple[Array, int]:
+    """A channel (N,) without spikes, and their number."""
+    at, said = spikes_of(values, interval)
     if not len(at):
         return values, 0
     mended = values.copy()
-    mended[at] = said * rows[at]
+    mended[at] = said
     return mended, len(at)
 
 

@@ -9,14 +9,12 @@ from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError
 from truenorth.estimate.gaps import LONGEST_BRIDGE
 from truenorth.live.log import Log
-from truenorth.records.base import GAP_FACTOR
+from truenorth.records.lost_rows import BACK, GAP_FACTOR, lack_rows, pace_of
 from truenorth.strapdown.increments import ImuRows, lost_between
 
 Array = NDArray[np.float64]
 Gap = tuple[float, float]  # s: the row before it, its length
 
-BACK, SOON = 9, 0.5  # rows and s next to a long step, which say how long an interval is, and whether rows are missing
-ONE_LOST = 1.9  # intervals, of a step with one row lost; less is a row that is late
 UNREST = 60.0  # s before a gap, whose motion says what may have happened in it
 
 
@@ -53,8 +51,7 @@ def bridged(
         steps[0] = interval
     long = np.flatnonzero(steps > GAP_FACTOR * interval)
     pace = np.array([_pace(log, float(time[row] - steps[row]), interval) for row in long])
-    after = np.concatenate([time, coming])
-    lacks = np.array([_lacks_rows(after[row:], steps[row], own) for row, own in zip(long, pace)], dtype=bool)
+    lacks = lack_rows(np.concatenate([time, coming]), long, steps[long], pace)
     at, pace = long[lacks], pace[lacks]
     if not at.size:
         return _samples(rows, log), [], []
@@ -85,20 +82,10 @@ def unbroken(rows: Array, last: Array, interval: float, *, begins: bool) -> Arra
 
 
 def _pace(log: Log, until: float, interval: float) -> float:
-    """The interval of the rows up to a time, s; stamps of milliseconds make two lengths of steps of one interval."""
+    """The interval of the rows up to a time, s."""
     time = log.rows[:, 0]
     last = int(np.searchsorted(time, until, side="right"))
-    steps = np.diff(time[max(0, last - BACK) : last]) / log.merged
-    return float(np.mean(steps[steps <= 2.0 * np.median(steps)])) if len(steps) > 2 else interval
-
-
-def _lacks_rows(time: Array, step: float, interval: float) -> bool:
-    """Whether rows are missing in a long step, from the times of the rows after it: of a row that is late the clock comes back."""
-    near = time[:BACK][time[:BACK] <= time[0] + SOON]
-    if len(near) == 1 and step < ONE_LOST * interval:  # the newest row: the next ones will say
-        return False
-    over = near - (time[0] - step) - interval * np.arange(1, len(near) + 1)
-    return float(over.min()) > (GAP_FACTOR - 1.0) * interval
+    return pace_of(time[max(0, last - BACK) : last], interval, log.merged)
 
 
 def _samples(rows: Array, log: Log) -> ImuRows:

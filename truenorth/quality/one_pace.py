@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from truenorth.core.remembered import remembered
 from truenorth.quality.sampling import Finding
 from truenorth.records import GAP_FACTOR, Guess, ImuRecord
+from truenorth.records.lost_rows import lack_rows
 from truenorth.records.pace import Stretch, stretches
 from truenorth.strapdown.increments import increments
 
@@ -43,6 +44,8 @@ def at_one_pace(record: ImuRecord) -> ImuRecord:
         lengths = record.steps[stretch.first : end] / stretch.pace
         lengths[0] = 1.0 if stretch.first == 0 else lengths[0]
         gone = np.flatnonzero(lengths > GAP_FACTOR)
+        steps, pace = lengths[gone] * stretch.pace, np.full(len(gone), stretch.pace)
+        gone = gone[lack_rows(record.time, stretch.first + gone, steps, pace)]
         lost[stretch.first + gone] = lengths[gone] - 1.0
         parts = np.unique([0, *gone, len(lengths)])
         for a, b in pairwise(parts):

@@ -64,8 +64,7 @@ def push_in_step(bench: TiltBench, theta: Array, right: Array) -> Push:
 def _left(bench: TiltBench, theta: Array) -> tuple[float, float]:
     """Squares of the level force that the gyros and an arm leave, and that a push in step with the tilt leaves as well."""
     flat, C = bench.carried(theta)
-    up = np.mean(C @ bench.force[..., None], axis=1)[..., 0]
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    up = bench.up(C)
     x, y = _level_axes(up)
     turned = (C @ theta[..., None])[..., 0]
     tilt = np.cross(np.cumsum(turned, axis=1) - 0.5 * turned, up[:, None])  # the way that gravity seems to go
@@ -79,8 +78,13 @@ def _left(bench: TiltBench, theta: Array) -> tuple[float, float]:
     ]
     known = flat.reshape(*theta.shape, 4)
     all_of = np.concatenate([known, np.stack(columns, axis=3)], axis=3)
-    level = np.stack([np.einsum("plic,pi->plc", all_of, axis) for axis in (x, y)], axis=2).reshape(-1, all_of.shape[3])
+    level = level_parts(all_of, up).reshape(-1, all_of.shape[3])
     return squares_left(level[:, 0], level[:, 1:4]), squares_left(level[:, 0], level[:, 1:])
+
+
+def level_parts(x: Array, up: Array) -> Array:
+    """(P, L, 2, N) level parts of columns (P, L, 3, N), by the vertical (P, 3) of each piece."""
+    return np.stack([np.einsum("plic,pi->plc", x, axis) for axis in _level_axes(up)], axis=2)
 
 
 def _level_axes(up: Array) -> tuple[Array, Array]:

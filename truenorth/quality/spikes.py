@@ -30,6 +30,7 @@ from truenorth.quality.quantum import largest_step, lattice
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
+from truenorth.strapdown.increments import of_own_intervals
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -121,15 +122,6 @@ def _last_stretch(count: int, rows: int) -> int:
     return max((count - rows // 2 - 1) // rows, 0) * rows
 
 
-def rows_held(record: ImuRecord) -> Array:
-    """(N,) how many rows a value holds: one of increments that is as long as the rows lost before it is no spike."""
-    held = np.ones(len(record))
-    if record.kind == "increments":
-        gaps = record.gaps[record.gaps > 0]
-        held[gaps] = record.steps[gaps] / record.interval
-    return held
-
-
 def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
     """Channels of a base at rest whose single rows to one side are errors, and what that does to heading and level.
 
@@ -140,11 +132,10 @@ def spikes_evidence(record: ImuRecord, lat: float) -> list[Evidence]:
     """
     counted = record.kind == "increments"
     unit = 1.0 / record.interval if counted else 1.0
-    held = rows_held(record)
+    gyro, accel = of_own_intervals(record)  # what a gap holds is no spike, and has a part of one in the row before it
     found = []
     for channel, name in enumerate(COLUMNS[record.kind]):
-        sensor = record.gyro if channel < 3 else record.accel
-        spikes = one_sided(sensor[:, channel % 3] / held, record.interval)
+        spikes = one_sided((gyro if channel < 3 else accel)[:, channel % 3], record.interval)
         if spikes is None:
             continue
         size = abs(spikes.mean) * unit

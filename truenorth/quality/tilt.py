@@ -16,8 +16,8 @@ a base shows whose gyros explain nearly all of gravity's swing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import permutations, product
 
 import numpy as np
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from truenorth.analysis.student import student_limit
 from truenorth.core.earth import GRAVITY_EQUATOR
+from truenorth.quality.one_sign import OneSign, one_sign
 from truenorth.quality.pushed import NO_PUSH, Push, push_in_step
 from truenorth.quality.tilt_bench import TiltBench, shifted
 from truenorth.records import ImuRecord
@@ -73,6 +74,8 @@ class Tilt:
         all along.
     pushed : Push
         Of a rough base: what goes with its tilt and is no delay.
+    sign : OneSign or None
+        A gyro whose sign is wrong by level force alone: of a base that hardly turns about it, heave is more than it leaves.
     """
 
     given: float
@@ -90,6 +93,7 @@ class Tilt:
     by_axis_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     turn: float = 0.0
     pushed: Push = NO_PUSH
+    sign: OneSign | None = None
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -101,7 +105,11 @@ class Tilt:
         }
         explains = self.best**2 < min(self.given**2 / limit("clearer tilt"), limit("explained tilt") * self.unturned**2)
         if explains and self.axes != IDENTITY:
-            return [Evidence("tilt.axes", figures, "unknown", ANY_EFFECT, ("imu_axes",))]
+            return [_other_axes(figures)]
+        if self.sign is not None:
+            signs = [-1.0 if i == self.sign.axis else 1.0 for i in range(3)]
+            figures |= {"given": self.sign.given, "best": self.sign.left, "axes": _columns((0, 1, 2), signs)}
+            return [_other_axes(figures)]
         late = "tilt.gyros_late" if self.delay > 0.0 else "tilt.gyros_early"
         alone = self.pushed.share <= limit("pushed in step")
         if explains and alone:
@@ -169,6 +177,12 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
     turns = np.sqrt(np.mean(turned**2, axis=(0, 1)))
     if float(np.linalg.norm(turns)) < LEAST_TURN:
         return None
+    return replace(_read(bench, theta, turns), sign=one_sign(bench, theta))
+
+
+def _read(bench: TiltBench, theta: Array, turns: Array) -> Tilt:
+    """All readings but a sign by level force; `turns`: RMS of the turns about each axis."""
+    interval, turns_within = bench.interval, bench.C_sb is not None
     unturned, given = bench.left(np.zeros_like(theta)), bench.left(theta)
     best, axes, delay = given, IDENTITY, 0.0
     few = [(o, s) for o, s in READINGS if _is_near(o, s)]
@@ -178,7 +192,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
         left = bench.left(theta[..., order] * signs)
         if left < 0.99 * best:
             best, axes = left, _columns(order, signs)
-    may_be_pushed = rough and C_sb is None  # a base that turns within itself, on an indexer, goes with no wave
+    may_be_pushed = rough and not turns_within  # a base that turns within itself, on an indexer, goes with no wave
     squares = {shift: bench.left(shifted(theta, shift / interval)) ** 2 for shift in SHIFTS if rough} | {0.0: given**2}
     shift = min(squares, key=squares.__getitem__)
     if squares[shift] < min(0.98 * best**2, 0.5 * given**2):
@@ -202,7 +216,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
         half, whole = (theta / np.maximum(1.0 + part * wrong, 0.1) for part in (0.5, 1.0))
         better = bench.left(whole) < bench.left(half) < given
         # An arm takes up most of a scale error, and of a push as well: a base that is not rough may be pushed all the same.
-        pushed_so = C_sb is None and push_in_step(bench, theta, whole).share > limit("pushed in step")
+        pushed_so = not turns_within and push_in_step(bench, theta, whole).share > limit("pushed in step")
         if not better or may_be_pushed or pushed_so:
             sigma_scale = np.full(3, np.inf)
         # Of an indexer the angles must say so, too: the waves that push its base leave some of that in the tilt as it spins.
@@ -214,6 +228,10 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
     pushed = push_in_step(bench, theta, shifted(theta, late / interval)) if may_be_pushed else NO_PUSH
     one_delay = given, unturned, best, axes, late, float(sigma[0]), tilt
     return Tilt(*one_delay, scale, sigma_scale, turns, len(theta), *each, turn, pushed)
+
+
+def _other_axes(figures: dict[str, Figure]) -> Evidence:
+    return Evidence("tilt.axes", figures, "unknown", ANY_EFFECT, ("imu_axes",))
 
 
 def least_scale(turned: Array) -> Array:
@@ -264,7 +282,7 @@ def _cells(record: ImuRecord) -> tuple[Array, Array, float, Array] | None:
     return dtheta, dvel / interval, interval, 0.5 * (time[..., 0] - record.interval + time[..., -1])
 
 
-def _columns(order: tuple[int, ...], signs: tuple[float, ...]) -> str:
+def _columns(order: Sequence[int], signs: Sequence[float]) -> str:
     """What the columns x, y, z hold when axis i is column ``order[i]`` times ``signs[i]``."""
     names = [""] * 3
     for axis, (column, sign) in enumerate(zip(order, signs, strict=True)):

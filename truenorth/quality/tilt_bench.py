@@ -27,11 +27,11 @@ class TiltBench:
 
     def carried(self, theta: Array) -> tuple[Array, Array]:
         """Force and the arm's columns (P L 3, 4) in axes that do not turn, pieces freed of a line, and ``C_is`` (P, L, 3, 3)."""
-        columns, C = self._columns(theta)
+        columns, C = self.columns(theta)
         return self.freed(columns).reshape(-1, 4), C
 
-    def _columns(self, theta: Array) -> tuple[Array, Array]:
-        """The same force and columns (P, L, 3, 4), with their lines."""
+    def columns(self, theta: Array) -> tuple[Array, Array]:
+        """Force and columns as :meth:`carried` gives them, by pieces (P, L, 3, 4) and with their lines, and ``C_is``."""
         C = np.stack([dcm_from_quaternion(integrate_attitude(piece)) for piece in theta])
         C = 0.5 * (C[:, 1:] + C[:, :-1])  # in the middle of a cell, to second order in its turn
         base = C if self.C_sb is None else C @ self.C_sb
@@ -41,6 +41,11 @@ class TiltBench:
             w = np.concatenate([w[:, :1], 0.5 * (w[:, 1:] + w[:, :-1]), w[:, -1:]], axis=1)
         W = skew(changes(w) / self.interval) + skew(w) @ skew(w)
         return np.concatenate([C @ self.force[..., None], base @ W], axis=3), C
+
+    def up(self, C: Array) -> Array:
+        """(P, 3) the vertical of each piece in axes that do not turn, by attitudes ``C_is`` (P, L, 3, 3)."""
+        up = np.mean(C @ self.force[..., None], axis=1)[..., 0]
+        return np.asarray(up / np.linalg.norm(up, axis=1, keepdims=True))
 
     def _turning(self, base: Array) -> Array:
         """(P, L-1, 3) rates from cell to cell of attitudes (P, L, 3, 3), rad/s."""
@@ -66,7 +71,7 @@ class TiltBench:
         flat, basis = x.reshape(len(x), x.shape[1], -1), _line(x.shape[1])
         return np.asarray((flat - basis @ (basis.T @ flat)).reshape(x.shape))
 
-    def _averaged(self, x: Array) -> Array:
+    def averaged(self, x: Array) -> Array:
         """Means over `AVERAGED` cells, pieces freed of a line."""
         sums = np.cumsum(x, axis=1)
         return self.freed((sums[:, AVERAGED:] - sums[:, :-AVERAGED]) / AVERAGED)
@@ -85,19 +90,19 @@ class TiltBench:
         All is averaged over half a second: the angular acceleration that an arm is fitted to has the noise of the gyros in it,
         differentiated. On a rope of 15 m that of gyros of .05 deg/sqrt(h) made the arm too short, and scale factors 3 % wrong.
         """
-        columns, C = self._columns(theta)
+        columns, C = self.columns(theta)
         up = (C @ self.force[..., None])[..., 0]
         rate = (C @ (theta / self.interval)[..., None])[..., 0]
         rate -= rate.mean(axis=1, keepdims=True)
         turns = C * theta[..., None, :]  # about each axis, in axes that do not turn
         angle = np.cumsum(turns, axis=1) - 0.5 * turns
         # Gyros that are late have not turned yet.
-        late = [self._averaged(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
-        scale = [self._averaged(np.cross(angle[..., i], up)).ravel() for i in range(3)]
-        biased = self.accel_bias * self._averaged(C).reshape(-1, 3)
-        flat = self._averaged(columns).reshape(-1, 4)
-        of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale], biased)
-        of_each = _by_pieces(len(theta), flat, [*late, *scale], biased)
+        late = [self.averaged(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
+        scale = [self.averaged(np.cross(angle[..., i], up)).ravel() for i in range(3)]
+        biased = self.accel_bias * self.averaged(C).reshape(-1, 3)
+        flat = self.averaged(columns).reshape(-1, 4)
+        of_all = by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale], biased)
+        of_each = by_pieces(len(theta), flat, [*late, *scale], biased)
         off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
         return off, sigma
 
@@ -112,7 +117,7 @@ class TiltBench:
         return float(np.sqrt(np.mean(np.sum(theta / self.interval * up, axis=-1) ** 2)))
 
 
-def _by_pieces(pieces: int, flat: Array, columns: list[Array], biased: Array) -> tuple[Array, Array]:
+def by_pieces(pieces: int, flat: Array, columns: list[Array], biased: Array) -> tuple[Array, Array]:
     """Sizes of columns (P L 3,) that explain the force best, with the best arm; one-sigmas by leaving out piece after piece.
 
     `biased` (P L 3, 3) is what a bias of one sigma along each axis makes of the force: what the columns take of it is in sigma.

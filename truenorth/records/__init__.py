@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING
 from truenorth.core.lazy import lazy
 
 if TYPE_CHECKING:
-    from truenorth.records.base import GAP_FACTOR, IN_ORDER, Guess, Late, Record
+    from truenorth.records.base import IN_ORDER, Guess, Late, Record
     from truenorth.records.encoder import EncoderRecord
     from truenorth.records.gnss import GnssRecord, HeightRecord
     from truenorth.records.imu import COLUMNS, ImuRecord
+    from truenorth.records.lost_rows import GAP_FACTOR
     from truenorth.records.odometer import OdometerRecord
     from truenorth.records.poses import MasterRecord, Trajectory
     from truenorth.records.velocity import VelocityRecord
@@ -35,7 +36,7 @@ __getattr__, __dir__ = lazy(
     {
         "COLUMNS": "imu",
         "EncoderRecord": "encoder",
-        "GAP_FACTOR": "base",
+        "GAP_FACTOR": "lost_rows",
         "GnssRecord": "gnss",
         "Guess": "base",
         "HeightRecord": "gnss",

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.core.remembered import remembered
 from truenorth.core.shown import as_xarray
+from truenorth.records.lost_rows import lost_before
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 LATEST = 1e20  # s: more than any clock counts, were it nanoseconds of our era
-GAP_FACTOR = 1.5  # a step of more than 1.5 nominal intervals has lost at least one sample
 
 
 class Late(NamedTuple):
@@ -138,7 +138,7 @@ class Record(_Ordered):
 
     @cached_property
     def gaps(self) -> NDArray[np.intp]:
-        """Rows that follow a gap: their step is longer than 1.5 nominal intervals."""
+        """Rows that follow a gap: rows are missing in their step (:mod:`~truenorth.records.lost_rows`)."""
         return _gaps(self.time)
 
     def between(self, start: float | None = None, stop: float | None = None) -> Self:
@@ -229,7 +229,7 @@ def _steps(time: Array) -> Array:
 @remembered
 def _gaps(time: Array) -> NDArray[np.intp]:
     """The same, nobody writes to it."""
-    return np.flatnonzero(_steps(time) > GAP_FACTOR * _median_step(time))
+    return lost_before(time, _median_step(time))
 
 
 @remembered

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.records.base import GAP_FACTOR, Record, check_positive, check_together
+from truenorth.records.base import Record, check_positive, check_together
 from truenorth.records.gnss import PLACE, check_place, in_degrees
 from truenorth.records.interpolation import interpolated
+from truenorth.records.lost_rows import GAP_FACTOR
 
 Array = NDArray[np.float64]
 ORTHONORMAL = 1e-6  # farthest that C C' may be from the unit matrix

@@ -118,13 +118,20 @@ def without_gaps(record: ImuRecord) -> ImuRecord:
     gaps = record.gaps[record.gaps > 0]
     missing = np.zeros(len(record))
     missing[gaps] = record.steps[gaps] - record.interval
-    gyro, accel = record.gyro.copy(), record.accel.copy()
-    if record.kind == "increments":
-        for k in gaps:
-            half = 0.5 * missing[k] / record.interval
-            gyro[k] = (gyro[k] - half * gyro[k - 1]) / (1.0 + half)
-            accel[k] = (accel[k] - half * accel[k - 1]) / (1.0 + half)
+    gyro, accel = of_own_intervals(record)
     return replace(record, time=record.time - np.cumsum(missing), gyro=gyro, accel=accel)
+
+
+def of_own_intervals(record: ImuRecord) -> tuple[Array, Array]:
+    """Gyros and accelerometers (N, 3) of a record from :func:`across_gaps`, each row without what the gap before it holds."""
+    gaps = record.gaps[record.gaps > 0]
+    if record.kind == "rates" or not gaps.size:
+        return record.gyro, record.accel
+    gyro, accel = record.gyro.copy(), record.accel.copy()
+    for k, half in zip(gaps, 0.5 * (record.steps[gaps] / record.interval - 1.0), strict=True):
+        gyro[k] = (gyro[k] - half * gyro[k - 1]) / (1.0 + half)
+        accel[k] = (accel[k] - half * accel[k - 1]) / (1.0 + half)
+    return gyro, accel
 
 
 def interval_lengths(
