@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 import truenorth
 from truenorth.aiding.aids import Gnss
 from truenorth.live import GnssFeed
+from truenorth.navigation.given import by_key
 from truenorth.records import GnssRecord
 from truenorth.records.stale import without_stale
 
@@ -151,10 +152,10 @@ def hung() -> GnssRecord:
     return GnssRecord(time, lat, zero + np.radians(LON), zero + 500.0, v_n=np.stack([zero, speed, zero], axis=1))
 
 
-def test_an_aid_takes_no_fix_twice() -> None:
-    aid = Gnss(hung())
+def test_navigation_takes_no_fix_twice() -> None:
+    aid = by_key(Gnss(hung()))["gnss"]
     assert aid.record.stale == 12
-    assert Gnss(aid.record).record is aid.record
+    assert by_key(aid)["gnss"].record is aid.record
     for source in aid.sources("gnss"):
         assert not ((source.time >= 50.0) & (source.time < 62.0)).any()
 

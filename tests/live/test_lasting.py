@@ -1,5 +1,6 @@
 """A receiver whose errors last, on a running answer: they are states of its loop, as in the whole log; any chunks, saved or not."""
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -60,7 +61,7 @@ def test_velocity_is_as_unsure_as_errors_that_last_leave_it(monkeypatch):
     """Four runs of 30 answers that are not independent: RMS scatters by some 0.2."""
     seeds = (1, 2, 3, 4)
     assert (rms_of_velocity(seeds) < 1.45).all()
-    monkeypatch.setattr(loop, "FIRST_LOOK", np.inf)
+    monkeypatch.setattr(lasting, "LOOKS", ())
     assert rms_of_velocity(seeds).max() > 1.6
 
 
@@ -137,8 +138,77 @@ def test_a_run_whose_rows_are_added_up_looks_back_no_more():
     assert np.abs(case.off_velocity(answers)).max() < 5.0
 
 
-def test_looks_go_on_until_each_aid_had_rows_enough():
-    times = [lasting.FIRST_LOOK]
-    while np.isfinite(times[-1]) and times[-1] < 1e4:
-        times.append(lasting.next_look(times[-1], times[-1] > 500.0))
-    assert times == [5.0, 75.0, 150.0, 300.0, 600.0, np.inf]
+def test_looks_follow_the_first_rows_of_each_aid():
+    times = [-np.inf]
+    while np.isfinite(times[-1]) or len(times) == 1:
+        times.append(lasting.next_look(times[-1], [10.0, 40.0]))
+    assert times[1:] == [15.0, 45.0, 85.0, 115.0, 160.0, 190.0, np.inf]
+    assert lasting.next_look(0.0, []) == np.inf
+
+
+@pytest.mark.parametrize("before", [0.0, 6.0, 700.0])
+def test_a_run_may_begin_long_before_its_rows(before):
+    """Its looks count from there; it raised for want of rows."""
+    case = Wandering(3, duration=40.0)
+    run = case.run()
+    case.start = replace(case.start, time=case.start.time - before)
+    early = case.run()
+    for each in (run, early):
+        case.feed(each, 25)
+    assert early._loop.slow.keys() == run._loop.slow.keys() == {"GNSS position", "GNSS velocity"}
+
+
+def test_headings_may_come_later_than_the_first_fix():
+    """A second antenna that finds its heading after ten seconds: it was no source of the loop, and a push raised."""
+    case = Wandering(3, duration=30.0)
+    runs = case.run(), case.run()
+    fixes = case.aid.record
+    C = case.motion.states(fixes.time).C_nb
+    heading = np.arctan2(C[:, 0, 1], C[:, 1, 1])
+    for chunk, run in zip((5, 50), runs, strict=True):
+        g = 0
+        for first in range(0, len(case.log), chunk):
+            part = slice(first, first + chunk)
+            while g < len(fixes) and fixes.time[g] + 0.1 <= case.log.time[part][-1]:
+                seen = {"heading": heading[g], "heading_sigma": 0.01} if fixes.time[g] > 10.0 else {}
+                run.feeds["gnss"].push(
+                    fixes.time[g], fixes.lat[g], fixes.lon[g], fixes.alt[g], v_n=fixes.v_n[g], **seen
+                )
+                g += 1
+            run.push(case.log.time[part], case.log.gyro[part], case.log.accel[part])
+        assert "GNSS heading" in {residuals.name for residuals in run.residuals}
+    np.testing.assert_array_equal(runs[0].answer.motion.v_n, runs[1].answer.motion.v_n)
+
+
+def test_a_logger_faster_than_its_receiver_in_any_chunks():
+    """Ten rows of each fix: each is judged by the rows before it alone."""
+    case = Wandering(4, duration=30.0)
+    fixes = case.aid.record
+    often = np.repeat(np.arange(len(fixes)), 5)
+    groups = {name: getattr(fixes, name)[often] for name in fixes.groups() if getattr(fixes, name) is not None}
+    time = (fixes.time[:, None] + 0.2 * np.arange(5)).ravel()
+    case.aid = type(case.aid)(replace(fixes, **{**groups, "time": time}), case.aid.mounting)
+    runs = case.run(), case.run()
+    for chunk, run in zip((3, 60), runs, strict=True):
+        case.feed(run, chunk)
+    assert sum(len(r.time) for r in runs[0].residuals if r.name == "GNSS position") <= len(fixes)
+    np.testing.assert_array_equal(runs[0].answer.motion.v_n, runs[1].answer.motion.v_n)
+
+
+def test_two_threads_may_ask_at_once():
+    """Rows of a feed that waited were lost to one that asked while another read them."""
+    case = Wandering(5, duration=20.0)
+    run, alone = case.run(), case.run()
+    ended = threading.Event()
+
+    def ask():
+        while not ended.is_set():
+            _ = run.answer
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    case.feed(run, 5)
+    ended.set()
+    asking.join()
+    case.feed(alone, 5)
+    assert len(run.feeds["gnss"].rows) == len(alone.feeds["gnss"].rows)

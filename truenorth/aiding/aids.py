@@ -18,7 +18,6 @@ from truenorth.aiding.source import Aiding
 from truenorth.errors.log import LogErrors, log_errors
 from truenorth.records import EncoderRecord, GnssRecord, HeightRecord, MasterRecord, OdometerRecord, VelocityRecord
 from truenorth.records.flexure import FlexureSpec
-from truenorth.records.stale import without_stale
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.mounting import Mounting
 
@@ -82,7 +81,7 @@ class Gnss(_Mounted):
     Attributes
     ----------
     record : GnssRecord
-        Fixes that are written again while the vehicle goes on are left out.
+        Procedures leave out fixes that are written again while the vehicle goes on.
     mounting : Mounting, optional
         Of the antenna; a second one is on the forward axis of ``C_mb``, to `angle_sigma` (1 deg when left out). Left out, arm
         (5 m, and more where the data ask for it) and latency (.2 s) are estimated.
@@ -91,9 +90,6 @@ class Gnss(_Mounted):
     record: GnssRecord
     key: ClassVar[str] = "gnss"
     usual: ClassVar[Mounting] = ANTENNA
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "record", without_stale(self.record))
 
     def sources(self, altitude: str) -> list[Aiding]:
         """Positions and velocities."""

@@ -56,6 +56,7 @@ from truenorth.quality.slow_aids import FIXES, SPEEDS
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
+from truenorth.records.stale import without_stale
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import DP, PHI
 from truenorth.state.mounting import Mounting
@@ -151,7 +152,7 @@ def align_in_motion(
         Too short a log.
     """
     tell = progress or (lambda stage: None)
-    body = in_body_axes(odometer, velocity)
+    body, gnss = in_body_axes(odometer, velocity), None if gnss is None else without_stale(gnss)
     task = moving_task(record, imu, body, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
     task = replace(task, slow=velocity_errors, errors=errors).with_spec(task.spec)
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):

@@ -6,6 +6,7 @@ at a time, as measurements for the closed loop.
 
 from __future__ import annotations
 
+import threading
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
@@ -21,12 +22,15 @@ from truenorth.state.mounting import Mounting
 
 Array = NDArray[np.float64]
 
+READING = threading.Lock()  # two threads may ask for rows at once
+
 MOST_ROWS = 200_000
 STEP = 2520  # rows by which the window of new measurements moves: an odometer is averaged in blocks, mostly of 1 to 10 rows
 LARGEST = 1e8  # SI units: beyond what any of these sensors measures
 FEW, OTHER_CLOCK = 5, 86400.0  # rows from which on, and s from their median beyond which, a row is of another clock
 MOVES = 1.0  # m/s: faster than an antenna on a swaying mast
 LASTING = 3  # rows in a line
+OFTEN = 4.0  # rows a second: errors that last are seen in as many
 APART = ("clock.ahead", "clock.behind", "clock.gps_or_utc")  # evidence that rows were moved by whole seconds
 
 
@@ -82,6 +86,11 @@ class Feed(ABC):
     @property
     def rows(self) -> Array:
         """(N, 1 + columns) all rows so far."""
+        with READING:
+            return self._read()
+
+    def _read(self) -> Array:
+        """All rows so far, those that wait among them."""
         waiting, self._waiting = self._waiting, []  # another thread may add
         if waiting:
             new = np.vstack(waiting)
@@ -136,6 +145,17 @@ class Feed(ABC):
                 continue
             return True
         return False
+
+    def fresh(self, rows: Array) -> Array:
+        """These rows (N, 1 + columns) without those that are the row before, written again; each by the rows before it alone."""
+        return rows
+
+    def looked_at(self, until: float, mounting: Mounting | None = None) -> Aid | None:
+        """The rows up to a time as an aid in which errors that last are sought, `OFTEN` a second at most; None: fewer than two."""
+        rows = self.fresh(self.rows[: int(np.searchsorted(self.rows[:, 0], until, side="right"))])
+        while len(rows) > OFTEN * max(rows[-1, 0] - rows[0, 0], 1.0):
+            rows = self.halved(rows)
+        return self._mounted(rows.copy(), mounting) if len(rows) > 1 else None
 
     def until(self, until: float, mounting: Mounting | None = None) -> Aid | None:
         """The rows up to a time as an aid; None where there are fewer than two."""
@@ -192,7 +212,10 @@ class Feed(ABC):
         if len(rows) - first < 2 or rows[-1, 0] <= max(sent.values(), default=since):
             return []
         found = []
-        for source in self._mounted(rows[first:].copy(), mounting).sources(altitude):
+        window = self.fresh(rows[first:])
+        if len(window) < 2:
+            return []
+        for source in self._mounted(window.copy(), mounting).sources(altitude):
             new = np.flatnonzero(source.time > sent.get(source.name, since))
             if new.size:
                 sent[source.name] = float(source.time[new].max())

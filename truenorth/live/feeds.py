@@ -108,6 +108,18 @@ class GnssFeed(Feed):
         scale = 6.371e6  # metres to a radian, about: moved or not
         return np.column_stack([rows[:, 1] * scale, rows[:, 2] * scale * np.cos(rows[:, 1])])
 
+    def fresh(self, rows: Array) -> Array:
+        """See :class:`Feed`: fixes with place and velocity of the row before, to the last digit, as noise never has them.
+
+        A receiver that holds its fix where the vehicle stands says that it does.
+        """
+        fix = rows[:, 1:7]
+        same = ((fix[1:] == fix[:-1]) | (np.isnan(fix[1:]) & np.isnan(fix[:-1]))).all(axis=1) & np.isfinite(fix[1:, 0])
+        if not same.any():
+            return rows
+        stands = (fix[1:, 3:5] == 0.0).all(axis=1)
+        return rows[np.concatenate([[True], ~same | stands])]
+
     def dummy(self) -> Array:
         """Positions and velocities of a vehicle at rest; headings where some have come."""
         rows = super().dummy()

@@ -9,8 +9,7 @@ velocity of an answer: it was up to 5 sigmas off.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -30,24 +29,16 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.state import Start
 
-FIRST_LOOK, SECOND, ENOUGH = (
+LOOKS = (
     5.0,
     75.0,
-    300.0,
-)  # s after the start; no more looks beyond the last, if all aids had rows enough
+    150.0,
+)  # s after the first rows of an aid: a minute of fixes is the least that shows how their errors last
 
 
-class Seen(NamedTuple):
-    """What a look shows."""
-
-    slow: Slow  # errors of aids that last, by their sources' names
-    said: list[Evidence]  # of them
-    enough: bool  # whether each source had rows enough
-
-
-def next_look(after: float, enough: bool) -> float:
-    """When the look comes that follows one, s after the start; infinity: never."""
-    return math.inf if enough and after >= ENOUGH else max(SECOND, 2.0 * after)
+def next_look(last: float, begun: Sequence[float]) -> float:
+    """The time of the look that follows one, s, of aids whose rows begin at these times; infinity: there is none."""
+    return min((first + after for first in begun for after in LOOKS if first + after > last), default=math.inf)
 
 
 def lasting_errors(
@@ -57,8 +48,8 @@ def lasting_errors(
     altitude: Altitude,
     spec: ImuSpec,
     aids: Mapping[str, Aid | None],
-) -> Seen:
-    """Errors of aids that last, and what is to be said of them.
+) -> tuple[Slow, list[Evidence]]:
+    """Errors of aids that last, by their sources' names, and what is to be said of them.
 
     Parameters
     ----------
@@ -79,17 +70,16 @@ def lasting_errors(
     receiver = given.get(Gnss.key)
     if isinstance(receiver, Gnss) and receiver.mounting is not None and receiver.mounting.bias_sigma is not None:
         unseen.pop(FIXES, None)
-    short = [_seconds(source) < LEAST_ROWS for source in sources]
-    if all(short):
-        return Seen(unseen, [], not sources and len(given) == len(aids))
+    if all(_seconds(source) < LEAST_ROWS for source in sources):
+        return unseen, []
     try:
         record, _, disturbances = bridge_gaps(record)
         every = max(1, round(1.0 / FINE))
         plan = Plan(record, start, model, altitude, disturbances, FINE, every, axis_sigma(spec)[0].max())
         plan, _, said = with_slow_errors(plan, given, plan.run(plan.sources(given)))
     except (DataError, UsageError):  # the loop itself says what is wrong
-        return Seen(unseen, [], enough=False)
-    return Seen({**unseen, **plan.slow}, said, not any(short) and len(given) == len(aids))
+        return unseen, []
+    return {**unseen, **plan.slow}, said
 
 
 def _seconds(source: Aiding) -> int:

@@ -19,7 +19,7 @@ from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.bridges import Gap, bridged, unbroken
 from truenorth.live.feed import Feed
-from truenorth.live.lasting import FIRST_LOOK, lasting_errors, next_look
+from truenorth.live.lasting import lasting_errors, next_look
 from truenorth.live.log import Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
@@ -76,7 +76,7 @@ class Loop:
         self.failure = ""
         self.slow: Slow = {}  # errors of aids that last, as the last look has found them
         self.said: list[Evidence] = []
-        self._look = FIRST_LOOK  # s after the start, when it looks back next
+        self._looked = -np.inf  # s, when it looked back last
         self._waiting: list[Array] = []
         self._anew()
 
@@ -87,6 +87,7 @@ class Loop:
         self.siblings = Siblings(self.start)
         self._noise = NoiseSeen(self.spec, self.kind)
         self._made = None
+        self._more = False  # whether rows of a source have come that the loop did not know of
         self._state: LoopState | None = None
         self._interval = 0.0
         # The row that was taken last, as it came; of the start its time alone counts.
@@ -127,10 +128,21 @@ class Loop:
 
     def advance(self, until: float, feeds: Mapping[str, Feed], log: Log) -> None:
         """Take the rows and measurements up to a time, and look back where it is time to."""
-        while (at := self.start.time + self._look) < until:
+        while (at := next_look(self._looked, self._begun(feeds, log))) < until:
             self._advance(at, feeds, log)
-            self._look = next_look(self._look, self._look_back(feeds, log))
+            self._looked = at
+            self._look_back(feeds, log)
         self._advance(until, feeds, log)
+        if self._more and log.merged == 1:  # a receiver whose headings come later than its first fix
+            self._take_anew(self.slow, self.said, feeds, log)
+            self._more = False
+
+    def _begun(self, feeds: Mapping[str, Feed], log: Log) -> list[float]:
+        """When the rows of each aid begin that the loop takes, s."""
+        rows = [feed.rows[:, 0] for feed in feeds.values()]
+        begin = max(self.start.time, float(log.rows[0, 0])) if len(log) and log.merged == 1 else np.inf
+        firsts = [np.searchsorted(time, begin) for time in rows]
+        return [float(time[first]) for time, first in zip(rows, firsts, strict=True) if first < len(time)]
 
     def _advance(self, until: float, feeds: Mapping[str, Feed], log: Log) -> None:
         """Take the rows and measurements up to a time; rows that come for a time before it are too late."""
@@ -172,32 +184,31 @@ class Loop:
         if feeds:  # else errors grow as the start says
             self.siblings.begin(setting, time, self._interval)
 
-    def _look_back(self, feeds: Mapping[str, Feed], log: Log) -> bool:
-        """Take all rows so far anew, with errors of aids that last as these rows show them; whether there is no more to be seen.
-
-        Not where rows were added up.
-        """
-        if self.failure or log.merged > 1 or not feeds:
-            return True
-        if self._state is None:
-            return False
-        aids = {key: feed.until(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
+    def _look_back(self, feeds: Mapping[str, Feed], log: Log) -> None:
+        """Take all rows so far anew, with errors of aids that last as these rows show them."""
+        if self.failure or self._state is None or self.end <= self.start.time:
+            return
         rows = log.record(self.start.time, self.end)
-        slow, said, enough = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
-        if not slow and not self.slow:
-            return enough
+        if len(rows) < FIRST:
+            return
+        aids = {key: feed.looked_at(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
+        slow, said = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
+        if slow or self.slow:
+            self._take_anew(slow, said, feeds, log)
+
+    def _take_anew(self, slow: Slow, said: list[Evidence], feeds: Mapping[str, Feed], log: Log) -> None:
+        """Take all rows so far anew, by these errors of aids that last and by all sources that there are now."""
         before = vars(self).copy()
+        rows = log.record(self.start.time, self.end)
         notes, waiting = self.past.notes, self._waiting
-        taken = np.column_stack([rows.time, rows.gyro, rows.accel])
         self.slow, self.said = slow, said
         self._anew()
         self.past.notes = notes
-        self._waiting = [taken]
+        self._waiting = [np.column_stack([rows.time, rows.gyro, rows.accel])]
         self._advance(float(rows.time[-1]), feeds, log)
         self._waiting += waiting
         if self.failure:  # it broke down with these errors: as before
             vars(self).update(before)
-        return enough
 
     def _bridged(self, rows: Array, log: Log) -> tuple[ImuRows, list[Aiding], list[Gap]]:
         begins = self.end == self.start.time
@@ -214,7 +225,9 @@ class Loop:
                 found += feed.measurements(self.altitude, self.mountings.get(key), sent, self.start.time)
             except DataError as error:
                 self.past.note(key, str(error))
-        return with_slow(found, self.slow)
+        known = {source.name for source in self.setting(feeds).sources}
+        self._more |= any(source.name not in known for source in found)
+        return with_slow([source for source in found if source.name in known], self.slow)
 
     def now(self, feeds: Mapping[str, Feed], log: Log) -> tuple[Track, Sequence[Track], float] | None:
         """One epoch: the loop carried over the rows that wait, which it does not take; siblings there, and how far they were."""

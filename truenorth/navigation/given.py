@@ -18,6 +18,7 @@ from truenorth.navigation.curve import seen_in_body, shows_body_velocity
 from truenorth.navigation.result import Altitude
 from truenorth.records import GnssRecord, Late
 from truenorth.records.specs import ImuSpec
+from truenorth.records.stale import without_stale
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import ANTENNA_ARM
 from truenorth.state.mounting import Mounting
@@ -28,7 +29,7 @@ OF_ATTITUDE = ("attitude", "magnetometer")  # keys of aids that show no velocity
 
 
 def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
-    """The aids in the order in which their measurements are taken."""
+    """The aids in the order in which their measurements are taken, without fixes that are written again."""
     aids: Sequence[Aid] = aid if isinstance(aid, list | tuple) else (aid,)
     for a in aids:
         if not isinstance(a, Aid):
@@ -36,7 +37,7 @@ def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
                 f"aid {type(a).__name__} is not for navigation; expected {', '.join(k.__name__ for k in AIDS)}, or an object "
                 "with key, record and sources"
             )
-    found = {a.key: a for a in aids}
+    found = {a.key: replace(a, record=without_stale(a.record)) if isinstance(a, Gnss) else a for a in aids}
     if len(found) < len(aids):
         raise UsageError(f"aid holds two of one kind: {', '.join(a.key for a in aids)}; expected one of each")
     order = [kind.key for kind in AIDS]
