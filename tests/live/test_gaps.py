@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.live.test_siblings import SWELL, Anchored
-from truenorth.live import GnssFeed, Navigator
+from truenorth.live import GnssFeed, Navigator, lasting
 from truenorth.live.bridges import bridged, unbroken
 from truenorth.live.log import Log
 from truenorth.navigation import navigate
@@ -169,12 +169,14 @@ def test_aids_that_come_too_late_are_called_so():
     assert "before the start or after the end" not in said
 
 
-def test_a_sensor_of_which_every_row_comes_too_late_is_named():
+def test_a_sensor_of_which_every_row_comes_too_late_is_named(monkeypatch):
+    """A look back takes them, as long as one is to come."""
     case = Gappy(lost=(), duration=40.0)
     run = Navigator(case.start, case.spec, feeds=[GnssFeed()], mountings={"gnss": case.aid.mounting}, kind="increments")
     run.push(case.log.time, case.log.gyro, case.log.accel)
     fixes = case.aid.record.between(None, 30.0)
     run.feeds["gnss"].push(fixes.time, fixes.lat, fixes.lon, fixes.alt, v_n=fixes.v_n)
+    monkeypatch.setattr(lasting, "LOOKS", ())
     run.push(case.log.time[-1] + [0.04, 0.08], case.log.gyro[-2:], case.log.accel[-2:])
     run.push(case.log.time[-1] + [1.04, 1.08], case.log.gyro[-2:], case.log.accel[-2:])
     assert any("came more than a second after" in reason for reason in run.answer.reasons)
