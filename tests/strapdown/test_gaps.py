@@ -102,3 +102,27 @@ def test_a_whole_log_and_a_running_one_have_the_same_gaps(seed):
     log.add(rows)
     _, _, gaps = bridged(rows[1:], rows[0], np.empty(0), record.interval, log, begins=False)
     assert [before for before, _ in gaps] == time[record.gaps - 1].tolist()
+
+
+@pytest.mark.parametrize(("every", "kept"), [(2, 0), (3, 0)])
+def test_rows_that_are_lost_again_and_again_are_gaps_each(every, kept):
+    """The pace of so few rows is no pace: of each second row of two seconds six of fifty were found, in a running log likewise."""
+    lost = np.arange(100, 200) % every != kept
+    time = np.delete(EVEN, 100 + np.flatnonzero(lost))
+    expected = np.flatnonzero(np.diff(time) > 0.03) + 1
+    record, log = at_rest(time), Log("increments")
+    assert record.gaps.tolist() == expected.tolist()
+    rows = np.hstack([time[:, None], record.gyro, record.accel])
+    log.add(rows)
+    _, _, gaps = bridged(rows[1:], rows[0], np.empty(0), record.interval, log, begins=False)
+    assert [before for before, _ in gaps] == time[expected - 1].tolist()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_jitter_hides_no_lost_row(seed):
+    """A tenth of an interval, one sigma."""
+    rng = np.random.default_rng(seed)
+    time = EVEN + np.clip(0.002 * rng.standard_normal(400), -0.006, 0.006)
+    kept = (rng.random(400) > 0.03) | (np.arange(400) < 2) | (np.arange(400) > 390)
+    expected = np.flatnonzero(np.diff(np.flatnonzero(kept)) > 1) + 1
+    assert at_rest(time[kept]).gaps.tolist() == expected.tolist()

@@ -1,8 +1,7 @@
 """Long steps of a clock in which rows are missing, against those of rows that are stamped late: the clock comes back from these.
 
 A row that a computer stamps late makes a long step and a short one, and nothing is lost. Behind a lost row all further ones are as
-late as it is long. So a long step lacks rows where the earliest of the rows behind it, by their own pace, is late by half an
-interval, too.
+late as it is long. So nothing is lost in a long step where some of the rows behind it are late by less than half an interval.
 """
 
 from __future__ import annotations
@@ -14,9 +13,12 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 GAP_FACTOR = 1.5  # a step of more than 1.5 nominal intervals may have lost a sample
-BACK, SOON = 9, 0.5  # rows and s next to a long step, which say how long an interval is, and whether rows are missing
-EVEN = 4  # steps, whose sum stamps of milliseconds leave nearly even
+BEHIND, SOON = 9, 0.5  # rows, and s, behind a long step, which say whether rows are missing
+IN_TIME = 3  # of these rows, that are in time where nothing is lost: one may be early by its jitter
+BACK, EVEN = 400, 10  # rows before a long step, and steps on end, whose sums are even of stamps of milliseconds, too
+LEAST = 0.25  # of these sums: the others may hold lost rows
 ONE_LOST = 1.9  # intervals, of a step with one row lost; less is a row that is late
+AT_ONCE = 100_000  # long steps
 
 
 def lost_before(time: Array, interval: float) -> Rows:
@@ -31,35 +33,25 @@ def lost_before(time: Array, interval: float) -> Rows:
     """
     steps = time[1:] - time[:-1]
     long = np.flatnonzero(steps > GAP_FACTOR * interval) + 1
-    if not long.size:
-        return long
-    pace = np.array([pace_of(time[max(0, row - BACK) : row], interval) for row in long])
-    return np.asarray(long[lack_rows(time, long, steps[long - 1], pace)])
+    parts = np.split(long, range(AT_ONCE, len(long), AT_ONCE))
+    return np.concatenate([part[lack_rows(time, part, steps[part - 1], np.array(interval))] for part in parts])
 
 
 def pace_of(time: Array, interval: float, merged: int = 1) -> float:
-    """The interval of rows at these times (K,), s; stamps of milliseconds make two lengths of steps of one interval.
+    """The interval of the rows at these times (K,), s; stamps of milliseconds make two lengths of steps of one interval.
 
     Parameters
     ----------
     time : (K,) array, s
-        Of the last `BACK` rows before a long step.
+        Of the last `BACK` rows before a long step, some of which may be lost.
     interval : float, s
         What is said where they are too few.
     merged : int
         Rows that each of them stands for.
     """
-    steps = np.diff(time) / merged
-    if len(steps) < 3:
+    if len(time) <= EVEN:
         return interval
-    steps = steps[steps <= 2.0 * np.median(steps)]
-    # A few steps on end are even, of such stamps, too; the fewest s that they take lacks no row, and neither a row that is lost nor
-    # one that is late, with the short step behind it, is a step of its size.
-    few = min(EVEN, len(steps))
-    sums = np.cumsum(np.append(0.0, steps))
-    about = float((sums[few:] - sums[:-few]).min()) / few
-    whole = steps[np.abs(steps - about) <= 0.5 * about]
-    return float(np.mean(whole)) if len(whole) else interval
+    return float(np.quantile(time[EVEN:] - time[:-EVEN], LEAST)) / (EVEN * merged)
 
 
 def lack_rows(time: Array, rows: Rows, steps: Array, pace: Array) -> NDArray[np.bool_]:
@@ -71,13 +63,17 @@ def lack_rows(time: Array, rows: Rows, steps: Array, pace: Array) -> NDArray[np.
         Ascending.
     rows : (m,) array
         At which long steps end.
-    steps, pace : (m,) arrays, s
-        These steps, and the interval of the rows before each of them.
+    steps : (m,) array, s
+    pace : (m,) array, or of one number, s
+        The interval of the rows around each of them.
     """
-    behind = np.arange(BACK)
+    behind = np.arange(BEHIND)
     at = rows[:, None] + behind
     near = time[np.minimum(at, len(time) - 1)]
     counts = (at < len(time)) & (near <= time[rows][:, None] + SOON)
-    over = np.where(counts, near - (time[rows] - steps)[:, None] - pace[:, None] * (behind + 1), np.inf)
-    newest = (counts.sum(axis=1) == 1) & (steps < ONE_LOST * pace)  # nothing says whether the clock comes back
-    return np.asarray((over.min(axis=1) > (GAP_FACTOR - 1.0) * pace) & ~newest)
+    late = near - (time[rows] - steps)[:, None] - pace[..., None] * (behind + 1)
+    late = np.sort(np.where(counts, late, np.inf), axis=1)
+    there = counts.sum(axis=1)
+    least = np.take_along_axis(late, np.minimum(IN_TIME, there)[:, None] - 1, axis=1)[:, 0]
+    newest = (there == 1) & (steps < ONE_LOST * pace)  # nothing says whether the clock comes back
+    return np.asarray((least > (GAP_FACTOR - 1.0) * pace) & ~newest)
