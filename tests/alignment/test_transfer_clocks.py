@@ -7,7 +7,8 @@ import pytest
 
 from tests.runs import some
 from truenorth.alignment.transfer_delay import delay_by_arm, find_delay
-from truenorth.alignment.transfer_start import parted_clocks
+from truenorth.alignment.transfer_filter import Assumed
+from truenorth.alignment.transfer_start import common_clock, parted_clocks
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.position import Position
@@ -116,3 +117,20 @@ def test_an_arm_moves_the_delay_that_lengths_of_forces_show(along):
     assert (
         delay_by_arm(off, master, 0.0 * arm, 0.5) > 0.24 * said
     )  # of an arm that is uncertain by half a metre along each axis
+
+
+@pytest.mark.parametrize("jump", [1.0, -5.0])
+def test_a_clock_that_jumps_between_turns_is_not_that_of_the_other_turn(logs, jump):
+    """The last turn agrees with the first one all over: a delay of 90 s was taken, and the answer `aligned`."""
+    slave, master = (log.between(None, 150.0) for log in logs)
+    half = master.time > 80.0
+    time = master.time + jump * half
+    kept = ~half | (time > 80.0)
+    rows = {name: getattr(master, name)[kept] for name in ("lat", "lon", "alt", "v_n", "C_nb")}
+    jumped = replace(master, time=time[kept], **rows)
+    assert abs(find_delay(slave, jumped, np.eye(3)).delay) > 80.0
+    assumed = Assumed(delay_sigma=0.05)
+    assert common_clock(slave, jumped, assumed) == (assumed, ())
+    assert parted_clocks(slave, jumped, np.eye(3), 0.0) is not None
+    late = replace(master, time=master.time + 20.0)
+    assert abs(common_clock(slave, late, assumed)[0].delay - 20.0) < 0.1

@@ -60,7 +60,11 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     by_arm = delay_by_arm(slave, master, assumed.lever_arm, assumed.lever_arm_sigma)
     sigma = math.hypot(assumed.delay_sigma, by_arm)
     slack = limit("other delay") * max(sigma, 0.5 * master.interval)
-    if found.sure and not apart and miss > AGAIN and _again(slave, master, assumed, found):
+    # Of a clock that jumps between manoeuvres that are alike, one of them agrees with the other better than all where it was said.
+    elsewhere = found.sure and not apart and miss > AGAIN
+    if elsewhere and (
+        _again(slave, master, assumed, found) or parted_clocks(slave, master, assumed.C_mb, assumed.delay)
+    ):
         return assumed, ()
     if found.sure and (apart or miss > slack):
         if not apart and runs_backwards(slave, master, assumed.C_mb, assumed.delay, slack):
