@@ -23,7 +23,7 @@ STEMS = {
     r"spec(?:ific)?_?force|sf|f(?:_?ib_?b|_?ib|_?b|m)?|a(?:_?rs_?s|_?ib_?b|_?ib|_?b|m)?|g_?f",
 }
 BEFORE = re.compile(
-    r"(?:(?:imu|ins|field|sensors?|raw|calib(?:rated)?|cal|uncal(?:ibrated)?|body|data|device|meas(?:ured)?|output|inertial|combined|b|mems|fog|rlg|left|right|main|primary|scaled|shimmer(?:_(?=\w*\d)[0-9a-f]{1,4}(?=_)(?:_(?!acc)[a-f]{1,3}(?=_))?)?|\d+)_?\d*_?)+"
+    r"(?:(?:imu|ins|field|sensors?|raw|calib(?:rated)?|cal|uncal(?:ibrated)?|body|data|device|meas(?:ured)?|output|inertial|combined|b|mems|fog|rlg|left|right|main|primary|scaled|shimmer(?:_(?=\w*\d)[0-9a-f]{1,4}(?=_)(?:_(?!acc)[a-f]{1,3}(?=_))?)?|\d++)(?:_?\d++)?_?)+"
 )
 CHIPS = (  # as Android names its sensors: ``accelerometer_lsm6ds3_c``
     r"(?:lsm|lis|ism|bm[aigx]|ic[mg]|iim|mpu|adxl|adis|mma|kx|l3g|itg|fx[ao]s|stk|ak[mg]?)_?\d\w*"

@@ -23,8 +23,9 @@ KINDS = {
     r"pres(?:sure)?|ligh(?:t)?|prox(?:imity)?|(?:ambient_)?temp(?:erature)?|(?:relative_)?humi(?:dity)?|step\w*|wifi|ble\w*|"
     r"sou(?:nd?)?|rfid|posi|imu[xl]|heart_?rate|battery|activity|altimeter|significant_motion|compass|heading|network|annotation",
 }
-FIRST = r"(?:(?:android|sensor|type|raw|cal|calibrated|uncal|uncalibrated|phone|watch|imu|[a-z]*\d\w*?)_)*"  # before the sensor
-LAST = r"(?:_?(?:data|readings?|sensor|raw|cal|calibrated|uncal|uncalibrated|\d+|(?:non_)?wakeup))*"  # behind it
+# Before the sensor, and behind it; digits are taken whole, or a name of hundreds of them would be tried in all ways.
+FIRST = r"(?:(?:android|sensor|type|raw|cal|calibrated|uncal|uncalibrated|phone|watch|imu)_)*(?:[a-z]*\d\w*_)?"
+LAST = r"(?:_?(?:data|readings?|sensor|raw|cal|calibrated|uncal|uncalibrated|\d++|(?:non_)?wakeup))*"
 OF_ANDROID = re.compile(r"(?:android\.sensor\.|type_)", re.IGNORECASE)  # whose units are SI
 USER = re.compile(
     rf"{FIRST}user_?acc(?:el(?:eration)?)?{LAST}"
