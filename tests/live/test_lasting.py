@@ -158,19 +158,23 @@ def test_a_run_may_begin_long_before_its_rows(before):
     assert early._loop.slow.keys() == run._loop.slow.keys() == {"GNSS position", "GNSS velocity"}
 
 
-def test_headings_may_come_later_than_the_first_fix():
-    """A second antenna that finds its heading after ten seconds: it was no source of the loop, and a push raised."""
+@pytest.mark.parametrize("since", [1.0, 10.0])
+def test_headings_may_come_later_than_the_first_fix(since):
+    """A second antenna that finds its heading after ten seconds: it was no source of the loop, and a push raised.
+
+    After one second the loop has taken no row, or too few to begin anew.
+    """
     case = Wandering(3, duration=30.0)
     runs = case.run(), case.run()
     fixes = case.aid.record
     C = case.motion.states(fixes.time).C_nb
     heading = np.arctan2(C[:, 0, 1], C[:, 1, 1])
-    for chunk, run in zip((5, 50), runs, strict=True):
+    for chunk, run in zip((1, 50), runs, strict=True):
         g = 0
         for first in range(0, len(case.log), chunk):
             part = slice(first, first + chunk)
             while g < len(fixes) and fixes.time[g] + 0.1 <= case.log.time[part][-1]:
-                seen = {"heading": heading[g], "heading_sigma": 0.01} if fixes.time[g] > 10.0 else {}
+                seen = {"heading": heading[g], "heading_sigma": 0.01} if fixes.time[g] > since else {}
                 run.feeds["gnss"].push(
                     fixes.time[g], fixes.lat[g], fixes.lon[g], fixes.alt[g], v_n=fixes.v_n[g], **seen
                 )

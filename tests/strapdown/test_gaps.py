@@ -104,10 +104,10 @@ def test_a_whole_log_and_a_running_one_have_the_same_gaps(seed):
     assert [before for before, _ in gaps] == time[record.gaps - 1].tolist()
 
 
-@pytest.mark.parametrize(("every", "kept"), [(2, 0), (3, 0)])
-def test_rows_that_are_lost_again_and_again_are_gaps_each(every, kept):
+@pytest.mark.parametrize("every", [2, 3])
+def test_rows_that_are_lost_again_and_again_are_gaps_each(every):
     """The pace of so few rows is no pace: of each second row of two seconds six of fifty were found, in a running log likewise."""
-    lost = np.arange(100, 200) % every != kept
+    lost = np.arange(100, 200) % every != 0
     time = np.delete(EVEN, 100 + np.flatnonzero(lost))
     expected = np.flatnonzero(np.diff(time) > 0.03) + 1
     record, log = at_rest(time), Log("increments")

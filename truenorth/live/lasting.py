@@ -29,11 +29,8 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.state import Start
 
-LOOKS = (
-    5.0,
-    75.0,
-    150.0,
-)  # s after the first rows of an aid: a minute of fixes is the least that shows how their errors last
+# s after the first rows of an aid: a minute of fixes is the least that shows how their errors last
+LOOKS = (5.0, 75.0, 150.0)
 
 
 def next_look(last: float, begun: Sequence[float]) -> float:

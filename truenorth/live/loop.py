@@ -29,6 +29,7 @@ from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.start import force_at_rest
 from truenorth.quality.slow_aids import Slow, with_slow
+from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.mounting import Mounting
@@ -133,8 +134,10 @@ class Loop:
             self._looked = at
             self._look_back(feeds, log)
         self._advance(until, feeds, log)
-        if self._more and log.merged == 1:  # a receiver whose headings come later than its first fix
-            self._take_anew(self.slow, self.said, feeds, log)
+        if (
+            self._more and (rows := self._taken(log)) is not None
+        ):  # a receiver whose headings come later than its first fix
+            self._take_anew(rows, self.slow, self.said, feeds, log)
             self._more = False
 
     def _begun(self, feeds: Mapping[str, Feed], log: Log) -> list[float]:
@@ -184,22 +187,27 @@ class Loop:
         if feeds:  # else errors grow as the start says
             self.siblings.begin(setting, time, self._interval)
 
+    def _taken(self, log: Log) -> ImuRecord | None:
+        """All rows that were taken; None where they are too few to begin anew with, or were added up, or the loop broke down."""
+        first, last = np.searchsorted(log.rows[:, 0], (self.start.time, self.end), side="right")
+        if self.failure or self._state is None or log.merged > 1 or last - first < FIRST:
+            return None
+        return log.record(self.start.time, self.end)
+
     def _look_back(self, feeds: Mapping[str, Feed], log: Log) -> None:
         """Take all rows so far anew, with errors of aids that last as these rows show them."""
-        if self.failure or self._state is None or self.end <= self.start.time:
-            return
-        rows = log.record(self.start.time, self.end)
-        if len(rows) < FIRST:
+        if (rows := self._taken(log)) is None:
             return
         aids = {key: feed.looked_at(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
         slow, said = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
         if slow or self.slow:
-            self._take_anew(slow, said, feeds, log)
+            self._take_anew(rows, slow, said, feeds, log)
 
-    def _take_anew(self, slow: Slow, said: list[Evidence], feeds: Mapping[str, Feed], log: Log) -> None:
+    def _take_anew(
+        self, rows: ImuRecord, slow: Slow, said: list[Evidence], feeds: Mapping[str, Feed], log: Log
+    ) -> None:
         """Take all rows so far anew, by these errors of aids that last and by all sources that there are now."""
         before = vars(self).copy()
-        rows = log.record(self.start.time, self.end)
         notes, waiting = self.past.notes, self._waiting
         self.slow, self.said = slow, said
         self._anew()
