@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from tests.live.test_siblings import SWELL, Anchored
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
-from truenorth.live import Navigator, lasting, loop
+from truenorth.live import GnssFeed, HeightFeed, Navigator, lasting, loop
 from truenorth.live.lasting import lasting_errors
 from truenorth.navigation import navigate
 from truenorth.state.layout import DV
@@ -216,3 +216,11 @@ def test_two_threads_may_ask_at_once():
     asking.join()
     case.feed(alone, 5)
     assert len(run.feeds["gnss"].rows) == len(alone.feeds["gnss"].rows)
+
+
+def test_a_feed_without_rows_is_left_out_of_a_look():
+    case = Wandering(3, duration=10.0)
+    run = Navigator(case.start, case.spec, feeds=[GnssFeed(), HeightFeed()], altitude="gnss", kind=case.log.kind)
+    case.feed(run, 25)
+    assert run._loop.slow.keys() == {"GNSS position", "GNSS velocity"}
+    assert run.answer.status == "navigated"

@@ -153,7 +153,7 @@ class Feed(ABC):
     def looked_at(self, until: float, mounting: Mounting | None = None) -> Aid | None:
         """The rows up to a time as an aid in which errors that last are sought, `OFTEN` a second at most; None: fewer than two."""
         rows = self.fresh(self.rows[: int(np.searchsorted(self.rows[:, 0], until, side="right"))])
-        while len(rows) > OFTEN * max(rows[-1, 0] - rows[0, 0], 1.0):
+        while len(rows) > 1 and len(rows) > OFTEN * max(rows[-1, 0] - rows[0, 0], 1.0):
             rows = self.halved(rows)
         return self._mounted(rows.copy(), mounting) if len(rows) > 1 else None
 
