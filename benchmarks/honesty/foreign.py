@@ -194,13 +194,17 @@ def fixed(
     jumps: int = 0,
     speeds: bool = True,
     stays: bool = False,
+    scatter: float = 0.0,
 ) -> GnssRecord:
     """A receiver's fixes: white and slow errors, its own idea of their size, a latency, the jumps of multipath.
 
-    `stays`: they have an error that stays, too, of which the receiver knows the size.
+    `stays`: they have an error that stays, too, of which the receiver knows the size. `scatter`: one sigma of their stamps, s, as
+    of rows that are stamped when they arrive.
     """
     time = np.arange(rng.uniform(0.2, 1.0), true.time[-1] - 0.5, every)
     at = time - rng.uniform(0.0, 0.03)  # of what a stamp says
+    if scatter > 0.0:
+        at = np.clip(at + scatter * rng.standard_normal(len(at)), 0.05, true.time[-1] - 0.05)
     place, v, C = true.at(at)
     half = 0.02
     after, before = (true.at(at + d) for d in (half, -half))

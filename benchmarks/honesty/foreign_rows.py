@@ -206,6 +206,11 @@ CASES = (
         "navigation, GNSS, consumer, multicopter, fixes with an error that stays",
         navigated(vehicles.multicopter, "consumer", 240.0, stays=True),
     ),
+    Case(
+        NAME,
+        "navigation, GNSS, industrial, aircraft, stamps that scatter by 0.15 s",
+        navigated(vehicles.aircraft, "industrial", 240.0, scatter=0.15),
+    ),
     Case(NAME, "navigation, GNSS, industrial, car, multipath", navigated(vehicles.car, "industrial", 240.0, jumps=3)),
 )
 

@@ -25,6 +25,11 @@ def differs(before: float, after: float) -> bool:
     return both[1] > 0.0 and (both[0] == 0.0 or math.log(both[1] / both[0]) > math.log(LEAST_FACTOR))
 
 
+def stamp_notes(scatter: float) -> list[Evidence]:
+    """That a receiver's stamps scatter by so much, s, one sigma; nothing of none."""
+    return [note("noise.stamps", name="GNSS", size=scatter)] if scatter > 0.0 else []
+
+
 def learnt_evidence(
     factors: Mapping[str, Array], delays: Mapping[str, tuple[float, float]], scatter: float, swings: float
 ) -> list[Evidence]:
@@ -40,9 +45,7 @@ def learnt_evidence(
     swings : float, m/s
         RMS of the antenna's swing that the receiver does not show.
     """
-    found = noise_notes(factors)
-    if scatter > 0.0:
-        found.append(note("noise.stamps", name="GNSS", size=scatter))
+    found = noise_notes(factors) + stamp_notes(scatter)
     if swings > 0.0:
         found.append(note("noise.swing", name=VELOCITIES, size=swings))
     return found + delay_notes(delays)

@@ -6,9 +6,10 @@ at a time, as measurements for the closed loop.
 
 from __future__ import annotations
 
+import math
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -21,6 +22,7 @@ from truenorth.core.errors import DataError
 from truenorth.state.mounting import Mounting
 
 Array = NDArray[np.float64]
+Rows = Callable[[list[Aiding]], list[Aiding]]
 
 READING = threading.Lock()  # two threads may ask for rows at once
 
@@ -186,7 +188,13 @@ class Feed(ABC):
         return aid if mounting is None or self.mounting is not None else aid.mounted(mounting)
 
     def measurements(
-        self, altitude: str, mounting: Mounting | None, sent: dict[str, float], since: float
+        self,
+        altitude: str,
+        mounting: Mounting | None,
+        sent: dict[str, float],
+        since: float,
+        until: float = math.inf,
+        shown: Rows = list,
     ) -> list[Aiding]:
         """Measurements that were not given away before.
 
@@ -200,6 +208,10 @@ class Feed(ABC):
             Time of the last measurement of each source that was given away; changed.
         since : float, s
             Measurements up to this time are never given away.
+        until : float, s
+            Nor are, as yet, those after this one.
+        shown : callable
+            What the measurements, with those before them, are with errors that were not said of them.
 
         Raises
         ------
@@ -215,8 +227,8 @@ class Feed(ABC):
         window = self.fresh(rows[first:])
         if len(window) < 2:
             return []
-        for source in self._mounted(window.copy(), mounting).sources(altitude):
-            new = np.flatnonzero(source.time > sent.get(source.name, since))
+        for source in shown(self._mounted(window.copy(), mounting).sources(altitude)):
+            new = np.flatnonzero((source.time > sent.get(source.name, since)) & (source.time <= until))
             if new.size:
                 sent[source.name] = float(source.time[new].max())
                 found.append(replace(source, **_rows_of(source, new)))

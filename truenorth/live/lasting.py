@@ -10,32 +10,62 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.in_motion_learnt import stamp_notes
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.axes import axis_sigma
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.slow_fit import usual
-from truenorth.navigation.passes import Plan, with_slow_errors
+from truenorth.navigation.passes import with_scattered_stamps, with_slow_errors
+from truenorth.navigation.plan import Plan
 from truenorth.navigation.procedure import FINE
 from truenorth.navigation.result import Altitude
-from truenorth.quality.slow_aids import FIXES, LEAST_ROWS, Slow
+from truenorth.quality.slow_aids import FIXES, LEAST_ROWS, Slow, with_slow
+from truenorth.quality.stamps import scattered_by_rows, with_scatter
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.state import Start
 
-# s after the first rows of an aid: a minute of fixes is the least that shows how their errors last
-LOOKS = (5.0, 75.0, 150.0)
+# s after the first rows of an aid: half a minute shows how stamps scatter, a minute is the least that shows how errors last
+LOOKS = (5.0, 30.0, 75.0, 150.0)
+GLANCE = 15.0  # s, between two glances at innovations alone
+AHEAD = 2.0  # s, of a measurement before its time: less its delay, as it is known by then, it may be due
+
+
+class Shown(NamedTuple):
+    """What a look shows of the aids."""
+
+    slow: Slow  # errors that last
+    stamps: float = 0.0  # s, one sigma of the receiver's stamps
+    said: Sequence[Evidence] = ()
+    since: float = -math.inf  # s: stamps are known to scatter in rows after this time
+
+    def on(self, aiding: Sequence[Aiding]) -> list[Aiding]:
+        """These measurements of one aid with such errors; each by the rows up to it alone."""
+        added = scattered_by_rows(aiding, self.stamps)
+        known = {s.name: added[s.name] * (s.time > self.since)[:, None] for s in aiding if s.name in added}
+        return with_scatter(with_slow(aiding, self.slow), known)
 
 
 def next_look(last: float, begun: Sequence[float]) -> float:
     """The time of the look that follows one, s, of aids whose rows begin at these times; infinity: there is none."""
     return min((first + after for first in begun for after in LOOKS if first + after > last), default=math.inf)
+
+
+def next_glance(last: float, begin: float, row: float) -> float:
+    """The time of the first glance after one, s, of a run from `begin` that has a row of this time; infinity: it has none."""
+    return (
+        begin + GLANCE * max(math.ceil((row - begin) / GLANCE), round((last - begin) / GLANCE) + 1)
+        if row < math.inf
+        else row
+    )
 
 
 def lasting_errors(
@@ -45,8 +75,8 @@ def lasting_errors(
     altitude: Altitude,
     spec: ImuSpec,
     aids: Mapping[str, Aid | None],
-) -> tuple[Slow, list[Evidence]]:
-    """Errors of aids that last, by their sources' names, and what is to be said of them.
+) -> Shown:
+    """Errors of aids that last, by their sources' names, and how much stamps scatter.
 
     Parameters
     ----------
@@ -67,16 +97,18 @@ def lasting_errors(
     receiver = given.get(Gnss.key)
     if isinstance(receiver, Gnss) and receiver.mounting is not None and receiver.mounting.bias_sigma is not None:
         unseen.pop(FIXES, None)
-    if all(_seconds(source) < LEAST_ROWS for source in sources):
-        return unseen, []
     try:
         record, _, disturbances = bridge_gaps(record)
         every = max(1, round(1.0 / FINE))
-        plan = Plan(record, start, model, altitude, disturbances, FINE, every, axis_sigma(spec)[0].max())
-        plan, _, said = with_slow_errors(plan, given, plan.run(plan.sources(given)))
+        askew = axis_sigma(spec)[0].max()
+        plan = Plan(record, start, model, altitude, disturbances, FINE, every, askew, slow=unseen)
+        plan, track = with_scattered_stamps(plan, given, plan.run(plan.sources(given)))
+        said: Sequence[Evidence] = ()
+        if any(_seconds(source) >= LEAST_ROWS for source in sources):
+            plan, _, said = with_slow_errors(plan, given, track)
     except (DataError, UsageError):  # the loop itself says what is wrong
-        return unseen, []
-    return {**unseen, **plan.slow}, said
+        return Shown(unseen)
+    return Shown(plan.slow, plan.stamps, [*stamp_notes(plan.stamps), *said])
 
 
 def _seconds(source: Aiding) -> int:

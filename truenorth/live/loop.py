@@ -7,19 +7,21 @@ last, which no single row shows, are then states of it, and it takes the rows an
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.in_motion_learnt import stamp_notes
 from truenorth.core.errors import DataError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.bridges import Gap, bridged, unbroken
 from truenorth.live.feed import Feed
-from truenorth.live.lasting import lasting_errors, next_look
+from truenorth.live.lasting import AHEAD, GLANCE, Shown, lasting_errors, next_glance, next_look
 from truenorth.live.log import Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
@@ -28,10 +30,10 @@ from truenorth.navigation.given import fed_back
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.start import force_at_rest
-from truenorth.quality.slow_aids import Slow, with_slow
+from truenorth.quality.slow_aids import with_slow
+from truenorth.quality.stamps import stamp_scatter
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import Evidence
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Track
@@ -75,9 +77,9 @@ class Loop:
         self.start, self.spec, self.kind, self.altitude, self.output = start, spec, kind, altitude, output
         self.mountings = dict(mountings)
         self.failure = ""
-        self.slow: Slow = {}  # errors of aids that last, as the last look has found them
-        self.said: list[Evidence] = []
+        self.shown = Shown({})  # of the aids, by the last look
         self._looked = -np.inf  # s, when it looked back last
+        self._glanced = start.time  # s, and at innovations alone
         self._waiting: list[Array] = []
         self._anew()
 
@@ -117,7 +119,7 @@ class Loop:
 
     def _set(self, feeds: Mapping[str, Feed]) -> Setting:
         asked = [s for key, feed in feeds.items() for s in feed.sources(self.altitude, self.mountings.get(key))]
-        sources = [*with_slow(asked, self.slow), Aiding.disturbance("gap"), Aiding.disturbance("noise")]
+        sources = [*with_slow(asked, self.shown.slow), Aiding.disturbance("gap"), Aiding.disturbance("noise")]
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
         model = with_states(self._model(), sources)
         return Setting(model, tuple(sources), stride, every, invariant=fed_back(sources))
@@ -129,15 +131,24 @@ class Loop:
 
     def advance(self, until: float, feeds: Mapping[str, Feed], log: Log) -> None:
         """Take the rows and measurements up to a time, and look back where it is time to."""
-        while (at := next_look(self._looked, self._begun(feeds, log))) < until:
+        while not self.failure:
+            look = next_look(self._looked, self._begun(feeds, log))
+            coming = min((float(rows[0, 0]) for rows in self._waiting), default=np.inf)
+            row = self.end if self.end > self._glanced else coming
+            glance = next_glance(self._glanced, self.start.time, row)
+            if (at := min(look, glance)) >= until:
+                break
             self._advance(at, feeds, log)
-            self._looked = at
-            self._look_back(feeds, log)
+            if at == look:
+                self._looked = at
+                self._look_back(feeds, log)
+            else:
+                self._glanced = at
+                self._glance(feeds)
         self._advance(until, feeds, log)
-        if (
-            self._more and (rows := self._taken(log)) is not None
-        ):  # a receiver whose headings come later than its first fix
-            self._take_anew(rows, self.slow, self.said, feeds, log)
+        # Of a receiver whose headings come later than its first fix:
+        if self._more and (rows := self._taken(log)) is not None:
+            self._take_anew(rows, self.shown, feeds, log)
             self._more = False
 
     def _begun(self, feeds: Mapping[str, Feed], log: Log) -> list[float]:
@@ -166,7 +177,7 @@ class Loop:
         assert self._state is not None
         setting = self.setting(feeds)
         try:
-            measured = self._measurements(feeds)
+            measured = self._measurements(feeds, until + AHEAD)
             samples, disturbances, gaps = self._bridged(part, log)
             self.gaps += gaps
             aiding = [*measured, *disturbances, self._noise.growth(part)]
@@ -199,17 +210,25 @@ class Loop:
         if (rows := self._taken(log)) is None:
             return
         aids = {key: feed.looked_at(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
-        slow, said = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
-        if slow or self.slow:
-            self._take_anew(rows, slow, said, feeds, log)
+        shown = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
+        if shown.stamps or shown.slow or self.shown.slow:
+            self._take_anew(rows, shown, feeds, log)
 
-    def _take_anew(
-        self, rows: ImuRecord, slow: Slow, said: list[Evidence], feeds: Mapping[str, Feed], log: Log
-    ) -> None:
+    def _glance(self, feeds: Mapping[str, Feed]) -> None:
+        """Count the scatter of a receiver's stamps from now on, where innovations show it by now: no row is taken anew."""
+        if self.shown.stamps or self.failure or (track := self.past.track) is None:
+            return
+        looks = round((self._glanced - self.start.time) / GLANCE)
+        seen = replace(track, residuals=self.past.residuals)
+        if stamps := stamp_scatter(seen, self.setting(feeds).sources, 0.0, looks):
+            said = [*self.shown.said, *stamp_notes(stamps)]
+            self.shown = self.shown._replace(stamps=stamps, said=said, since=self._glanced + AHEAD)
+
+    def _take_anew(self, rows: ImuRecord, shown: Shown, feeds: Mapping[str, Feed], log: Log) -> None:
         """Take all rows so far anew, by these errors of aids that last and by all sources that there are now."""
         before = vars(self).copy()
         notes, waiting = self.past.notes, self._waiting
-        self.slow, self.said = slow, said
+        self.shown = shown
         self._anew()
         self.past.notes = notes
         self._waiting = [np.column_stack([rows.time, rows.gyro, rows.accel])]
@@ -224,18 +243,19 @@ class Loop:
         coming = coming[coming > rows[-1, 0]]
         return bridged(rows, self._last, coming, self._interval, log, begins=begins)
 
-    def _measurements(self, feeds: Mapping[str, Feed]) -> list[Aiding]:
-        """New ones of all feeds; those of a feed whose rows cannot be are left out."""
+    def _measurements(self, feeds: Mapping[str, Feed], until: float) -> list[Aiding]:
+        """New ones of all feeds up to a time; those of a feed whose rows cannot be are left out."""
         found: list[Aiding] = []
         for key, feed in feeds.items():
             try:
                 sent = self._sent.setdefault(key, {})
-                found += feed.measurements(self.altitude, self.mountings.get(key), sent, self.start.time)
+                mounting = self.mountings.get(key)
+                found += feed.measurements(self.altitude, mounting, sent, self.start.time, until, self.shown.on)
             except DataError as error:
                 self.past.note(key, str(error))
         known = {source.name for source in self.setting(feeds).sources}
         self._more |= any(source.name not in known for source in found)
-        return with_slow([source for source in found if source.name in known], self.slow)
+        return [source for source in found if source.name in known]
 
     def now(self, feeds: Mapping[str, Feed], log: Log) -> tuple[Track, Sequence[Track], float] | None:
         """One epoch: the loop carried over the rows that wait, which it does not take; siblings there, and how far they were."""

@@ -286,12 +286,12 @@ class Navigator:
         )
         wanders: list[Evidence] = []
         if isinstance(receiver, Gnss):
-            track, wanders = known_as_followed(track, receiver, self.altitude, self.start, self._loop.slow)
+            track, wanders = known_as_followed(track, receiver, self.altitude, self.start, self._loop.shown.slow)
         slow = {str(item.figures["name"]) for item in wanders}
         evidence = [
             *innovation_evidence(track.residuals, last_sigma(track), in_sigma=slow),
             *wanders,
-            *self._loop.said,
+            *self._loop.shown.said,
             *self._why,
         ]
         gaps, late = tuple(self._loop.gaps), dict[str, Late]()

@@ -22,7 +22,8 @@ from truenorth.aiding.aids import Aid, Gnss
 from truenorth.core.errors import DataError
 from truenorth.estimate.slow_fit import bounded_misfit
 from truenorth.navigation.given import looked_at, mounted_as
-from truenorth.navigation.passes import Plan, filtered, lost, quick_swing
+from truenorth.navigation.passes import filtered, lost, quick_swing
+from truenorth.navigation.plan import Plan
 from truenorth.navigation.second_look import OPEN, looser, wrong_antenna
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit

@@ -10,7 +10,8 @@ from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
 from truenorth.core.errors import DataError
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.navigation.given import looked_at, mounted_as
-from truenorth.navigation.passes import Plan, delayed
+from truenorth.navigation.passes import delayed
+from truenorth.navigation.plan import Plan
 from truenorth.navigation.second_look import on_any_clock
 from truenorth.quality.innovations import contradicted
 from truenorth.records import ImuRecord

@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Aid, Gnss
-from truenorth.aiding.source import Aiding
-from truenorth.alignment.in_motion_learnt import differs
+from truenorth.alignment.in_motion_learnt import differs, stamp_notes
 from truenorth.core.errors import DataError
-from truenorth.errors.model import InsModel
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
-from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.slow_fit import fitted
-from truenorth.navigation.given import fed_back, looked_at, mounted_as
-from truenorth.navigation.result import Altitude
+from truenorth.navigation.given import looked_at, mounted_as
+from truenorth.navigation.plan import Plan
 from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
-from truenorth.quality.aid_noise import LOUD, WHEEL, changed, louder, noise_factors, noise_notes
-from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
-from truenorth.quality.stamps import with_scatter
+from truenorth.quality.aid_noise import LOUD, WHEEL, changed, noise_factors, noise_notes
+from truenorth.quality.slow_aids import FIXES, SPEEDS, slow_errors
+from truenorth.quality.stamps import scattered, stamp_scatter
 from truenorth.quality.swing import (
     UNSEEN_ARM,
     is_swung_late,
@@ -37,11 +33,9 @@ from truenorth.quality.swing import (
     unseen_swing,
     with_unseen_arm,
 )
-from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
-from truenorth.state.state import Start
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -54,50 +48,6 @@ LEAST_UNSEEN = 0.3  # of a swing that a filter lost a track by
 MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 
 
-@dataclass(frozen=True)
-class Plan:
-    """One navigation, ready to run with any set of measurements."""
-
-    record: ImuRecord
-    start: Start
-    model: InsModel
-    altitude: Altitude
-    always: Sequence[Aiding]  # gaps and stops
-    interval: float
-    every: int
-    askew: float  # scale factors and misalignments of the gyros by their specification, whatever a rival's are
-    slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
-    factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
-    swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
-    late: bool = False  # what the receiver shows late is its antenna's slow swing, too
-    unseen: float = 0.0  # share of that swing which is in their noise
-    scattered: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
-
-    def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
-        """Measurements of all aids."""
-        said = [source for a in given.values() for source in a.sources(self.altitude)]
-        return with_scatter(louder(with_slow(said, self.slow), self.factors), self.scattered)
-
-    def run(self, sensors: Sequence[Aiding], smooth: bool = False) -> Track:
-        """Filter with these measurements; smooth once that is asked for (:meth:`Track.whole`): it takes ten times as long."""
-        used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late), *self.always]
-        navigated = partial(
-            navigate_track,
-            self.record,
-            self.start,
-            with_states(self.model, used),
-            used,
-            interval=self.interval,
-            every=self.every,
-            invariant=fed_back(used),
-        )
-        return replace(navigated(), smoothing=cache(partial(navigated, smooth=True)) if smooth else None)
-
-    def finest(self) -> Track:
-        """Free, at every interval, without covariance."""
-        return navigate_track(self.record, self.start, self.model, interval=self.interval, every=1, covariance=False)
-
-
 def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dict[str, Any], Track, list[Evidence]]:
     """The plan with slow errors of aids that innovations show, aids as late as found, the track, and what is to be said."""
     said: list[Evidence] = []
@@ -107,6 +57,8 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     plan, track = _with_late_swing(plan, given, track, smooth)
     plan, track = _with_swing_apart(plan, given, track, smooth)
     plan, track = _not_lost(plan, given, track, smooth)
+    if lost(track):
+        plan, track = with_scattered_stamps(plan, given, track, smooth)
     plan, track = _as_noisy(plan, given, track, smooth)
     said += noise_notes(plan.factors)
     plan, given, track, unsure = _on_another_clock(plan, first, given, track, smooth)
@@ -126,6 +78,8 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     plan, track = _with_swing_apart(plan, given, track, smooth)  # as late as it is now
     if plan is not as_it_was:
         plan, track = _with_unseen_swing(plan, given, track, smooth)
+    plan, track = with_scattered_stamps(plan, given, track, smooth)
+    said += stamp_notes(plan.stamps)
     plan, track, lasting = with_slow_errors(plan, given, track, smooth)
     said += lasting
     receiver = given.get(Gnss.key)
@@ -287,6 +241,33 @@ def _with_swing(plan: Plan, given: dict[str, Any], track: Track, arm: Array, sha
     fixes = [source for source in plan.sources(given) if source.name == SPEEDS]
     added = {source.name: share * swing(track, plan.record, arm, source.time) for source in fixes}
     return replace(plan, unseen=share, scattered=added)
+
+
+def with_scattered_stamps(
+    plan: Plan, given: Mapping[str, Any], track: Track, smooth: bool = False
+) -> tuple[Plan, Track]:
+    """The plan whose receiver's stamps scatter as innovations show, and its track, where the log speaks for it; else the same ones.
+
+    Gates keep out the rows that would show it: a track that is lost is looked at without.
+    """
+    free = mounted_as(given, {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()})
+    for _ in range(NOISE_PASSES):
+        aiding = [source for source in plan.sources(given) if source.name in (FIXES, SPEEDS)]
+        try:
+            seen = plan.run(plan.sources(free)) if lost(track) else track
+            sigma = stamp_scatter(seen, aiding, plan.stamps)
+            if sigma == 0.0 or not differs(
+                plan.stamps, sigma
+            ):  # what explains a log is kept: with it, less is to be explained
+                break
+            other = replace(plan, stamps=sigma, stamped=scattered(aiding, seen, sigma))
+            quiet = other.run(other.sources(given), smooth=smooth)
+        except DataError:  # the filter broke down
+            break
+        if plan.stamps == 0.0 and not explained_by_two(quiet, track):
+            break
+        plan, track = other, quiet
+    return plan, track
 
 
 def _on_another_clock(

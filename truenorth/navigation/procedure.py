@@ -48,7 +48,8 @@ from truenorth.navigation.given import (
     with_rows,
 )
 from truenorth.navigation.gyro_moment import gyros_of_another_moment
-from truenorth.navigation.passes import COARSE, Plan, filtered, quick_swing
+from truenorth.navigation.passes import COARSE, filtered, quick_swing
+from truenorth.navigation.plan import Plan
 from truenorth.navigation.recentred import recentred
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, second_look

@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
 from truenorth.core.attitude import rotation_vector_from_dcm
-from truenorth.quality.whiteness import FEWEST
+from truenorth.core.earth import radii
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
+FEWEST = 20  # differences; the likelihood says whether they are enough
 LONGEST = 0.5  # s, one sigma: more is no scatter of stamps
 TRIES = np.concatenate([[0.0], np.geomspace(2e-3, LONGEST, 60)])  # s, one sigma
 SLOW = 1e-9  # m/s, m/s^2 or rad/s: rates that have no direction, and are looked at along ..
@@ -36,7 +37,7 @@ STEP = 0.5  # s, over which the motion of a vehicle is steady
 MOST = 25.0  # square of a normalised difference, that is an outlier beyond
 
 
-def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float) -> float:
+def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float, looks: int = 1) -> float:
     """One sigma of the stamps of a receiver or a master, s, as its innovations show it; 0 where chance explains them.
 
     Parameters
@@ -46,6 +47,8 @@ def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float) -> float:
     aiding : iterable of Aiding
     had : float, s
         The scatter that is in their sigmas already.
+    looks : int
+        How many times a running log has been asked: so many chances there were.
     """
     names = {source.name for source in aiding}
     sources = [r for r in track.residuals if r.name in SOURCES and r.name in names]
@@ -54,7 +57,7 @@ def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float) -> float:
         return 0.0
     likelihood = np.sum([likelihoods(*pair, TRIES) for pair in seen], axis=0)
     best = int(np.argmax(likelihood))
-    return float(TRIES[best]) if likelihood[best] - likelihood[0] > limit("rival") else 0.0
+    return float(TRIES[best]) if likelihood[best] - likelihood[0] > limit("rival") + 4.0 * math.log(looks) else 0.0
 
 
 def scattered(aiding: Sequence[Aiding], track: Track, sigma: float) -> dict[str, Array]:
@@ -64,9 +67,44 @@ def scattered(aiding: Sequence[Aiding], track: Track, sigma: float) -> dict[str,
     return {s.name: sigma * np.abs(SOURCES[s.name](track, s.time)) for s in aiding if s.name in SOURCES}
 
 
+def scattered_by_rows(aiding: Sequence[Aiding], sigma: float) -> dict[str, Array]:
+    """The same without a track: by the motion that a receiver's rows show themselves, each by those up to it alone."""
+    if sigma == 0.0:
+        return {}
+    moves = next((s for s in aiding if s.name == "GNSS velocity"), None)
+    found = {}
+    for source in aiding:
+        if source.name == "GNSS velocity":
+            rate = _since(source.time, source.measured)
+        elif source.name == "GNSS position":
+            rate = _since(source.time, _metres(source.measured)) if moves is None else _held(source.time, moves)
+        else:
+            continue
+        found[source.name] = sigma * np.abs(np.nan_to_num(rate))
+    return found
+
+
 def with_scatter(aiding: Sequence[Aiding], added: Mapping[str, Array]) -> list[Aiding]:
     """The same sources with these sigmas added to theirs."""
     return [replace(s, sigma=np.hypot(s.sigma, added[s.name])) if s.name in added else s for s in aiding]
+
+
+def _since(time: Array, values: Array) -> Array:
+    """(M, 3) rate of change of values over the last second, or the rows since, where there are fewer."""
+    before = np.maximum(time - 2.0 * STEP, time[0])
+    return (values - _at(before, time, values)) / np.maximum(time - before, SHORTEST)[:, None]
+
+
+def _held(time: Array, rows: Aiding) -> Array:
+    """(M, 3) the last of the rows up to each time; before the first one that."""
+    return rows.measured[np.maximum(np.searchsorted(rows.time, time, side="right") - 1, 0)]
+
+
+def _metres(place: Array) -> Array:
+    """(M, 3) east, north and up of the first of these places (rad, rad, m)."""
+    R_M, R_N = radii(place[0, 0])
+    off = place - place[0]
+    return np.stack([off[:, 1] * R_N * np.cos(place[0, 0]), off[:, 0] * R_M, off[:, 2]], axis=1)
 
 
 def _velocity(track: Track, time: Array) -> Array:
