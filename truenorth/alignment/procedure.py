@@ -349,7 +349,7 @@ def _align_inertial(
         biased = swung_biases(fine, np.sqrt(used.bias_variance[3:]), task.position)
         others = biased if others is None else np.concatenate([others, biased], axis=2)
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None, sways=swung)
-    steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere + rival_evidence(fine, lat)
+    steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere + rival_evidence(fine, task.position)
     heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)

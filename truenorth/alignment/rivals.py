@@ -10,7 +10,8 @@ With J the mean level rate that each scale factor and misalignment makes, P thei
 them, the rate that a heading off by d asks of them is ``J e + w - R(d) w``, and its likelihood before the log is that of a normal
 distribution with ``J P J' `` and what the log does not know. Of J what goes on in every part of the log counts: what goes round
 with the IMU makes a tilt that goes round, a turn of seconds makes one that stays, and neither a rate. Biases are left out: where
-they may be as large as the earth's rate fits begin at headings all round (:mod:`~truenorth.alignment.rotary`).
+they may be as large as the earth's rate fits begin at headings all round (:mod:`~truenorth.alignment.rotary`). Headings that are
+nearer than these are in a sigma that is not linear about one of them: :mod:`~truenorth.alignment.heading_course`.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.heading_course import course_evidence
 from truenorth.core.earth import EARTH_RATE
+from truenorth.core.position import Position
 from truenorth.errors.matrices import MATRICES
 from truenorth.errors.staying import PHI, STATES
 from truenorth.state.evidence import Effect, Evidence
@@ -35,17 +38,21 @@ NEAR, SIGMAS = math.radians(20.0), 10.0
 PARTS = 4  # of a log, in each of which a steady rate goes on
 
 
-def rival_evidence(fine: FineAlignment, lat: float) -> list[Evidence]:
-    """The heading farthest away that explains the log as well; sigma takes it in.
+def rival_evidence(fine: FineAlignment, position: Position) -> list[Evidence]:
+    """The heading farthest away that explains the log as well, or how likely the nearer ones are; sigma takes them in.
 
     Parameters
     ----------
     fine : FineAlignment
         Of an IMU that was turned, so that scale factors and misalignments are states; of another there is none.
-    lat : float, rad
+    position : Position
     """
-    off = rival_heading(fine, lat) if len(fine.taken) >= STATES + MATRICES else 0.0
-    return [Evidence("heading.rivals", {"off": off}, "hint", Effect(heading=off))] if off else []
+    if len(fine.taken) < STATES + MATRICES:
+        return []
+    off = rival_heading(fine, position.lat)
+    if not off:
+        return course_evidence(fine, position)
+    return [Evidence("heading.rivals", {"off": off}, "hint", Effect(heading=off))]
 
 
 def rival_heading(fine: FineAlignment, lat: float) -> float:

@@ -231,7 +231,7 @@ def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task
     evidence += base_speed(answer) + steps + bad_stretches(fine, task.record) + hemisphere
     if isinstance(fine, SwayAlignment):
         evidence += late_gyros_evidence(fine, fine.late, task.record) + accel_scale_evidence(fine, spec)
-        evidence += rival_evidence(fine, task.position.lat)
+        evidence += rival_evidence(fine, task.position)
     return evidence
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import bias_signatures
+from truenorth.alignment.circle_passes import settled_on_circle
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.late_gyros import response_to_late_gyros
@@ -34,7 +35,7 @@ from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
 from truenorth.errors.staying import PHI
 from truenorth.errors.sway import AxisMotion
-from truenorth.estimate.batch import settle
+from truenorth.estimate.batch import ROUGHLY, settle
 from truenorth.estimate.staying import Prior, StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
 from truenorth.records.specs import ImuSpec
@@ -206,6 +207,8 @@ def _with_motion(
 def _filtered(log: StayingLog, estimator: MotionFilter, misfit: Callable[[Position], float]) -> SwayAlignment:
     """The log about its last pass."""
     last = settle(log, estimator, estimator.moved, most=FILTER_PASSES if log.sways else POOR_PASSES, least=2)
+    if last.moved >= ROUGHLY and log.sways and "matrices" in log.prior.groups:  # of an IMU that was turned
+        last = settled_on_circle(log, estimator)
     if not log.sways:  # its passes believe what the sway shows of the sensors: the answer does not
         last = replace(last, found=estimator(log.averaged()))
     position, arm = log.position, log.prior.groups["arm"]
