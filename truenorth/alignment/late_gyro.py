@@ -26,7 +26,7 @@ from truenorth.alignment.swaying import SwayAlignment
 from truenorth.core.attitude import misalignment
 from truenorth.estimate.responses import Seen, likeliest
 from truenorth.records import ImuRecord
-from truenorth.records.interpolation import gyros_behind
+from truenorth.records.interpolation import held_at_ends
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
@@ -93,7 +93,7 @@ def late_gyro_evidence(fine: SwayAlignment, record: ImuRecord, anew: Anew) -> li
 def one_behind(record: ImuRecord, axis: int, late: float) -> ImuRecord:
     """The record with one gyro late by so many seconds, parts of a row too."""
     gyro = record.gyro.copy()
-    gyro[:, axis] = gyros_behind(record, late).gyro[:, axis]
+    gyro[:, [axis]] = held_at_ends(record.time, gyro[:, [axis]], record.time - late)
     return replace(record, gyro=gyro)
 
 
