@@ -32,8 +32,9 @@ Remembered = type(cache(len))
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
 
-# Code of functions that were met, and their docstrings: it names no values, and stays the same.
-_described: dict[tuple[CodeType, str | None], str] = {}
+# Of the code of functions that were met, and their docstrings: names, in order too, and its text, as it stands in that of the
+# function. It names no values, and stays the same.
+_described: dict[tuple[CodeType, str | None], tuple[set[str], list[str], str]] = {}
 
 
 class UnknownValueError(Exception):
@@ -151,16 +152,17 @@ class _Sources:
 
     def of_function(self, function: Any) -> str:
         code = function.__code__
-        names = _names(code)
+        seen = code, function.__doc__
+        if seen not in _described:  # kernels call the same functions
+            names = _names(code)
+            _described[seen] = names, sorted(names), repr(self.of_code(code, function.__doc__, names))
+        names, in_order, text = _described[seen]
         scope = function.__globals__
-        named = {name: self.of(scope[name], names) for name in sorted(names) if name in scope}
+        named = {name: self.of(scope[name], names) for name in in_order if name in scope}
         cells = [self.of(cell.cell_contents, names) for cell in function.__closure__ or ()]
         defaults = self.of(function.__defaults__, names)
         home = f"{function.__module__}.{code.co_qualname}"
-        seen = code, function.__doc__
-        if seen not in _described:  # kernels call the same functions
-            _described[seen] = self.of_code(code, function.__doc__, names)
-        return repr((home, _described[seen], named, cells, defaults))
+        return f"({home!r}, {text}, {named!r}, {cells!r}, {defaults!r})"
 
     def of_code(self, code: CodeType, doc: str | None, names: set[str]) -> str:
         skip = 1 if code.co_consts and isinstance(doc, str) and code.co_consts[0] == doc else 0

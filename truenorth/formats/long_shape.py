@@ -47,6 +47,20 @@ class Shape:
         return kind_of_number(name) if self.numbers else kind_of(name)
 
 
+def shape_for(path: Path, part: str) -> Shape | None:
+    """The shape of a long table that holds a part of what is read: ``imu``, ``gnss`` or ``mag``; None where a file is none.
+
+    Raises
+    ------
+    DataError
+        Rows of an IMU's sensors under numbers that are nobody's.
+    """
+    found = shape_of(path) if part in ("imu", "gnss", "mag") else None
+    if found is None and part == "imu":
+        _refuse_other_numbers(path)
+    return found
+
+
 def shape_of(path: Path) -> Shape | None:
     """The shape of a long table; None where a file is none."""
     head = first_bytes(path)
@@ -68,7 +82,10 @@ def shape_of(path: Path) -> Shape | None:
 def _shape(dialect: Dialect, column: int, cells: Sequence[Sequence[str]], lines: Sequence[str]) -> Shape | None:
     """The shape by a dialect and a column, where they fit."""
     keys = [row[column].strip("'") if column < len(row) else "" for row in cells]
-    for numbers, kind in ((False, kind_of), (True, kind_of_number)):
+    named = [k for k, key in enumerate(keys) if key[:1].isalpha()]
+    # Of a table of numbers one or two lines have a name: what names mean is not asked then.
+    ways = ((False, kind_of), (True, kind_of_number))
+    for numbers, kind in ways if named and len(named) >= MOSTLY * (len(keys) - named[-1]) else ways[1:]:
         kinds_of_names = {key: kind(key) for key in set(keys)}
         kinds = [kinds_of_names[key] for key in keys]
         first = next((k for k, one in enumerate(kinds) if one in ("gyro", "accel", "linear")), None)
@@ -102,7 +119,7 @@ def _remark_header(dialect: Dialect, lines: Sequence[str], count: int) -> list[s
     return names if len(names) == count else []
 
 
-def refuse_other_numbers(path: Path) -> None:
+def _refuse_other_numbers(path: Path) -> None:
     """Refuse a table of x, y and z whose column of types holds numbers that are not Android's."""
     lines = [line for line in first_bytes(path).decode("utf-8-sig", "replace").splitlines()[:200] if line.strip()]
     for dialect in (Dialect(delimiter, ".") for delimiter in DELIMITERS if lines):

@@ -27,7 +27,7 @@ from truenorth.core.errors import DataError
 from truenorth.formats.behaviour import clock_readings, gravity_level
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.content import REMARKS_BYTES, text_of
-from truenorth.formats.long_shape import OF_APP, OF_SENSOR, Shape, names_of, refuse_other_numbers, shape_of
+from truenorth.formats.long_shape import OF_APP, OF_SENSOR, Shape, names_of
 from truenorth.formats.names import clock_of, plain
 from truenorth.formats.sensor_folder import Sensor, merged, sensor_of, with_gravity
 from truenorth.formats.sensor_kinds import OF_ANDROID, USER, calibrated
@@ -42,24 +42,14 @@ MOST_LATE = 1000.0  # steps, by which a row may stand after later ones
 G, FASTEST = 9.80665, 20.0  # m/s^2; rad/s: no more is typical of a phone
 
 
-def is_one(path: Path) -> bool:
-    """Whether a file is a long table."""
-    return shape_of(path) is not None
-
-
-def columns(path: Path, part: str) -> Columns | None:
-    """One part of a long table, ``imu``, ``gnss`` or ``mag``, as a table of its own; None where the file is no long table.
+def columns(path: Path, part: str, shape: Shape) -> Columns:
+    """One part of a long table of some shape, ``imu``, ``gnss`` or ``mag``, as a table of its own.
 
     Raises
     ------
     DataError
         Rows that are damaged: with their line; sensors that are not there, or whose numbers are not what their names say.
     """
-    shape = shape_of(path) if part in ("imu", "gnss", "mag") else None
-    if shape is None:
-        if part == "imu":
-            refuse_other_numbers(path)
-        return None
     tables, counts, notes = _tables(path, shape)
     kinds = {name: shape.kind(name) for name in counts}
     have = ", ".join(f"{name} ({count})" for name, count in counts.most_common())

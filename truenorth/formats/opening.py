@@ -26,14 +26,17 @@ def columns_of(path: Path, format: str, named: bool = True, part: str = "imu") -
         A damaged file, or one without a table.
     """
     if format in ("csv", "kf-gins", "psins"):
-        from truenorth.formats import long_table, vbo
+        from truenorth.formats import vbo
         from truenorth.formats.labelled import NOTE
+        from truenorth.formats.long_shape import shape_for
         from truenorth.formats.text import open_table
 
         if vbo.is_one(path):
             return vbo.columns(path)
-        if (long := long_table.columns(path, part)) is not None:
-            return long
+        if (shape := shape_for(path, part)) is not None:
+            from truenorth.formats import long_table
+
+            return long_table.columns(path, part, shape)
         table = open_table(path)
         labelled = NOTE in table.notes
         notes = table.notes if labelled else (*table.notes, table.dialect.words())

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.formats import long_table, vbo
+from truenorth.formats import vbo
 from truenorth.formats.columns import Columns
+from truenorth.formats.long_shape import shape_of
 from truenorth.formats.text import TextTable, open_table
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ LARGEST_SIGMA = 1e4  # m
 
 def columns_of_positions(path: Path) -> Columns | None:
     """The columns of such a file; None where it is of another kind; a DataError where its times are no times."""
-    if vbo.is_one(path) or long_table.is_one(path):
+    if vbo.is_one(path) or shape_of(path) is not None:
         return None  # a table of named columns
     table = open_table(path)
     header = next(

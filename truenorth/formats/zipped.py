@@ -14,7 +14,6 @@ from pathlib import Path
 
 from truenorth.core.errors import DataError
 from truenorth.formats.content import LARGEST
-from truenorth.formats.sensor_folder import SUFFIXES, files_of, is_one
 
 BEGINNING = b"PK\x03\x04"
 
@@ -59,6 +58,8 @@ def of_folder(folder: Path, part: str) -> Path:
     DataError
         Several such files.
     """
+    from truenorth.formats.sensor_folder import files_of
+
     files = files_of(folder).get(part, []) if folder.is_dir() else []
     if len(files) > 1:
         names = ", ".join(path.name for path in files)
@@ -78,6 +79,8 @@ def _texts(path: Path) -> list[zipfile.ZipInfo]:
     """Text files of an archive; none of what is no archive, or of a NumPy archive that is cut short: its reader says so."""
     if not is_archive(path):
         return []
+    from truenorth.formats.sensor_folder import SUFFIXES  # which reads tables of sensors: not for a file alone
+
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
@@ -109,6 +112,8 @@ def _damaged(path: Path, error: Exception) -> DataError:
 
 
 def _chosen(top: Path, part: str) -> Path | None:
+    from truenorth.formats.sensor_folder import is_one
+
     folders = sorted([top, *(p for p in top.rglob("*") if p.is_dir())], key=lambda p: len(p.parts))
     for folder in folders:
         if part != "imu" and (found := of_folder(folder, part)) != folder:
