@@ -4,8 +4,12 @@ A row is *predicted less measured*, so that ``z = H x + noise`` with the states 
 computed minus true; what is left of a parameter, true minus assumed). With the lever arm l (body axes) and the clock lag
 tau (the measurement shows the antenna as it was tau before its time stamp):
 
-    position   z = dp - tau dv + (C l) x phi - C dl + v dtau - dbias
+    position   z = dp - tau dv + (C l - tau u) x phi - tau C (eps x l) - C (dl - tau w x dl) + (v + u) dtau - dbias
     velocity   z = dv + u x phi + C (eps x l) - C (w x dl) + a dtau,   u = C (w x l)
+
+What is late is the antenna, not the vehicle: on the roof of a tractor that rolls it moves by as much as the tractor drives, and of
+a fix of a centimetre .02 s of that are two. Rates are noisy, and what is within their noise tells of no delay: the column of the
+delay has a rate of its own, whose noise is not in z.
 
 Rows are in ENU. A velocity is measured in the axes at the true place; those at the computed place are turned against them
 by the convergence of the meridians, ``tan L dp_E/R`` about up.
@@ -19,13 +23,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, Row, lag_now, row, with_state
-from truenorth.core.attitude import cross, rotate, times
+from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, Row, beyond_noise, lag_now, row, with_state
+from truenorth.core.attitude import cross, rotate, times, times_back
 from truenorth.core.compiled import compiled
-from truenorth.state.now import NOW_C, matrix_of, vector_of
+from truenorth.state.now import NOW_C, NOW_EARTH, NOW_OTHER_RATE, NOW_RATE_NOISE, NOW_TURN, matrix_of, vector_of
 from truenorth.strapdown.wander import azimuth, curvature, earth_axis
 
-_PHI, _DV, _DP = 0, 3, 6
+_PHI, _DV, _DP, _BG = 0, 3, 6, 9
 
 
 @compiled
@@ -59,6 +63,8 @@ def convergence(s: Any) -> Any:
 def position_row(
     s: Any,  # (24,): the state, see :mod:`truenorth.strapdown.wander`
     C: Any,  # (3, 3): ``C_wb``
+    w_b: Any,  # tuple of 3, rad/s: rate of the body against the earth, body axes
+    turn: Any,  # the same for the column of the delay: what of another rate is beyond its noise
     arm: Any,  # tuple of 3, m; IMU to antenna, body axes
     lag: float,  # s
     bias: Any,  # tuple of 3, m; East, north, up: what the receiver is off by for minutes
@@ -77,21 +83,24 @@ def position_row(
     # The measured place's normal leans by K dr from ours.
     Kxx, Kxy, Kyy = curvature(earth_axis(s), s[11])
     determinant = Kxx * Kyy - Kxy * Kxy
-    out = times(C, arm)
+    swing, shown = cross(w_b, arm), times(C, cross(turn, arm))
+    out = times(C, (arm[0] - lag * swing[0], arm[1] - lag * swing[1], arm[2] - lag * swing[2]))
     z[0] = -(Kyy * n[0] - Kxy * n[1]) / determinant + out[0] - lag * s[4]
     z[1] = -(Kxx * n[1] - Kxy * n[0]) / determinant + out[1] - lag * s[5]
     z[2] = s[11] - measured[2] + out[2] - lag * s[6]
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
-        c = cross(out, e)
+        c, g, m = cross(out, e), times(C, cross(e, arm)), cross(w_b, e)
+        m = times(C, (e[0] - lag * m[0], e[1] - lag * m[1], e[2] - lag * m[2]))
         for i in range(3):
             H[i, _PHI + j] = c[i]
             H[i, _DP + j] = e[i]
             H[i, _DV + j] = -lag * e[i]
+            H[i, _BG + j] = -lag * g[i]
             if at_arm >= 0:
-                H[i, at_arm + j] = -C[i, j]
+                H[i, at_arm + j] = -m[i]
         if at_lag >= 0:
-            H[j, at_lag] = s[4 + j]
+            H[j, at_lag] = s[4 + j] + shown[j]
     into_north(s, H, z)
     for j in range(3):
         z[j] += bias[j]
@@ -107,7 +116,12 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         bias = vector_of(assumed, at[AT_BIAS])
     lag = lag_now(now, assumed, at[AT_LAG])
     C = matrix_of(now, NOW_C)
-    position_row(now, C, arm, lag, bias, at[AT_ARM], at[AT_LAG], at[AT_BIAS], measured, H, z)
+    still, other = times_back(C, vector_of(now, NOW_EARTH)), vector_of(now, NOW_OTHER_RATE)
+    turn = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
+    seen = beyond_noise(turn, now[NOW_RATE_NOISE])
+    turn = (seen * turn[0], seen * turn[1], seen * turn[2])
+    w_b = vector_of(now, NOW_TURN)
+    position_row(now, C, w_b, turn, arm, lag, bias, at[AT_ARM], at[AT_LAG], at[AT_BIAS], measured, H, z)
 
 
-POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1}, unit="m")
+POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1}, swings=True, unit="m")

@@ -55,8 +55,9 @@ class Row:
     instant : bool
         It needs rate and specific force at its very time; the loop then waits for the three samples after it.
     swings : bool
-        A velocity: where its sensor sits on an arm it needs the rate at its very time, too. The mean since the last event, T ago,
-        is that of ``T / 2`` before: an antenna two metres away would be off by ``.5 a T l``, decimetres a second on rough ground.
+        A velocity, or a place that may be late: where its sensor sits on an arm it needs the rate at its very time, too. The mean
+        since the last event, T ago, is that of ``T / 2`` before: an antenna two metres away would be off by ``.5 a T l``,
+        decimetres a second on rough ground.
     unit : str
         Of `z`, SI: what its innovations are shown in.
     axes : tuple of str
