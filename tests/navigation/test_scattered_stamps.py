@@ -71,9 +71,9 @@ def test_sigma_is_true_whatever_the_scatter(scatter):
         assert np.abs(ratios).max() < 4.0
 
 
-def running(log, start, aid, chunk, until=np.inf, path=None):
+def running(log, start, aid, chunk, until=np.inf, path=None, mounting=None):
     """A running answer on a flight, saved and loaded at a time."""
-    feed = GnssFeed()
+    feed = GnssFeed(mounting)
     run = Navigator(start, SPEC, feeds=[feed], mountings={"gnss": aid.mounting}, kind=log.kind)
     rows, sent = feed.rows_of(aid.record), 0
     for first in range(0, len(log), chunk):

@@ -164,9 +164,9 @@ class Feed(ABC):
         last = int(np.searchsorted(self.rows[:, 0], until, side="right"))
         return self._mounted(self.rows[:last].copy(), mounting) if last > 1 else None
 
-    def newest(self, count: int, mounting: Mounting | None = None) -> Aid | None:
+    def newest(self, count: int, mounting: Mounting | None = None, found: Mounting | None = None) -> Aid | None:
         """So many of the newest rows as an aid; None where there are fewer than two."""
-        return self._mounted(self.rows[-count:].copy(), mounting) if len(self.rows) > 1 else None
+        return self._mounted(self.rows[-count:].copy(), mounting, found) if len(self.rows) > 1 else None
 
     def moves_from(self) -> float | None:
         """Time from which the vehicle moves, s; None as long as it stays."""
@@ -177,15 +177,19 @@ class Feed(ABC):
         lasting = np.convolve(fast, np.ones(LASTING), "valid") == LASTING
         return float(self.rows[int(np.argmax(lasting)), 0]) if lasting.any() else None
 
-    def sources(self, altitude: str, mounting: Mounting | None) -> list[Aiding]:
-        """The measurements that may come, none of them there yet; `mounting` stands for one that is not given."""
-        _ = self.rows  # those that wait say what may come
-        found = self._mounted(self.dummy(), mounting).sources(altitude)
-        return [replace(source, **_rows_of(source, np.zeros(0, np.intp))) for source in found]
+    def sources(self, altitude: str, mounting: Mounting | None, found: Mounting | None = None) -> list[Aiding]:
+        """The measurements that may come, none of them there yet.
 
-    def _mounted(self, rows: Array, mounting: Mounting | None) -> Any:
+        `mounting` stands for one that is not given, `found` for whatever is given.
+        """
+        _ = self.rows  # those that wait say what may come
+        sources = self._mounted(self.dummy(), mounting, found).sources(altitude)
+        return [replace(source, **_rows_of(source, np.zeros(0, np.intp))) for source in sources]
+
+    def _mounted(self, rows: Array, mounting: Mounting | None, found: Mounting | None = None) -> Any:
         aid: Any = self.aid_of(rows)
-        return aid if mounting is None or self.mounting is not None else aid.mounted(mounting)
+        known = found or (mounting if self.mounting is None else None)
+        return aid if known is None else aid.mounted(known)
 
     def measurements(
         self,
@@ -194,6 +198,7 @@ class Feed(ABC):
         sent: dict[str, float],
         since: float,
         until: float = math.inf,
+        found: Mounting | None = None,
         shown: Rows = list,
     ) -> list[Aiding]:
         """Measurements that were not given away before.
@@ -210,6 +215,8 @@ class Feed(ABC):
             Measurements up to this time are never given away.
         until : float, s
             Nor are, as yet, those after this one.
+        found : Mounting, optional
+            Whatever is given.
         shown : callable
             What the measurements, with those before them, are with errors that were not said of them.
 
@@ -219,20 +226,21 @@ class Feed(ABC):
             Rows that cannot be.
         """
         rows = self.rows
-        oldest = int(np.searchsorted(rows[:, 0], min(sent.values(), default=since)))
+        late = 0.0 if found is None or not len(rows) else float(found.late_at(rows[-1, 0]))
+        oldest = int(np.searchsorted(rows[:, 0], min(sent.values(), default=since) + late))
         first = max(0, oldest // STEP - 1) * STEP
-        if len(rows) - first < 2 or rows[-1, 0] <= max(sent.values(), default=since):
+        if len(rows) - first < 2 or rows[-1, 0] - late <= max(sent.values(), default=since):
             return []
-        found = []
+        measured = []
         window = self.fresh(rows[first:])
         if len(window) < 2:
             return []
-        for source in shown(self._mounted(window.copy(), mounting).sources(altitude)):
+        for source in shown(self._mounted(window.copy(), mounting, found).sources(altitude)):
             new = np.flatnonzero((source.time > sent.get(source.name, since)) & (source.time <= until))
             if new.size:
                 sent[source.name] = float(source.time[new].max())
-                found.append(replace(source, **_rows_of(source, new)))
-        return found
+                measured.append(replace(source, **_rows_of(source, new)))
+        return measured
 
 
 def shift_as(found: Any, feeds: Mapping[str, Feed]) -> None:

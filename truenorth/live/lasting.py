@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,16 +21,19 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.axes import axis_sigma
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.latency import delay_notes, delays_found
 from truenorth.estimate.slow_fit import usual
-from truenorth.navigation.passes import with_scattered_stamps, with_slow_errors
+from truenorth.navigation.passes import delayed, with_scattered_stamps, with_slow_errors
 from truenorth.navigation.plan import Plan
 from truenorth.navigation.procedure import FINE
 from truenorth.navigation.result import Altitude
+from truenorth.navigation.second_look import SENSORS
 from truenorth.quality.slow_aids import FIXES, LEAST_ROWS, Slow, with_slow
 from truenorth.quality.stamps import scattered_by_rows, with_scatter
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
+from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 # s after the first rows of an aid: half a minute shows how stamps scatter, a minute is the least that shows how errors last
@@ -46,6 +49,7 @@ class Shown(NamedTuple):
     stamps: float = 0.0  # s, one sigma of the receiver's stamps
     said: Sequence[Evidence] = ()
     since: float = -math.inf  # s: stamps are known to scatter in rows after this time
+    mountings: Mapping[str, Mounting] = {}  # of aids that are as late as found, by their keys
 
     def on(self, aiding: Sequence[Aiding]) -> list[Aiding]:
         """These measurements of one aid with such errors; each by the rows up to it alone."""
@@ -91,7 +95,7 @@ def lasting_errors(
     aids : mapping of str to Aid or None
         Up to the record's end, by their keys; None: too few rows.
     """
-    given = {key: aid for key, aid in aids.items() if aid is not None}
+    given: dict[str, Any] = {key: aid for key, aid in aids.items() if aid is not None}
     sources = [source for aid in given.values() for source in aid.sources(altitude)]
     unseen = usual(source for source in sources if 0 < _seconds(source) < LEAST_ROWS)
     receiver = given.get(Gnss.key)
@@ -102,13 +106,19 @@ def lasting_errors(
         every = max(1, round(1.0 / FINE))
         askew = axis_sigma(spec)[0].max()
         plan = Plan(record, start, model, altitude, disturbances, FINE, every, askew, slow=unseen)
-        plan, track = with_scattered_stamps(plan, given, plan.run(plan.sources(given)))
+        track = plan.run(plan.sources(given))
+        asked, given = given, delayed(plan, given, track)
+        late = {key: given[key].mounting for key in SENSORS if given.get(key) is not asked.get(key)}
+        if late:
+            track = plan.run(plan.sources(given))
+        plan, track = with_scattered_stamps(plan, given, track)
         said: Sequence[Evidence] = ()
         if any(_seconds(source) >= LEAST_ROWS for source in sources):
-            plan, _, said = with_slow_errors(plan, given, track)
+            plan, track, said = with_slow_errors(plan, given, track)
     except (DataError, UsageError):  # the loop itself says what is wrong
         return Shown(unseen)
-    return Shown(plan.slow, plan.stamps, [*stamp_notes(plan.stamps), *said])
+    delays = delay_notes(delays_found(track, {SENSORS[key][0]: mounting for key, mounting in late.items()}))
+    return Shown(plan.slow, plan.stamps, [*delays, *stamp_notes(plan.stamps), *said], mountings=late)
 
 
 def _seconds(source: Aiding) -> int:

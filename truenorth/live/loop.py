@@ -118,7 +118,12 @@ class Loop:
         return self._made
 
     def _set(self, feeds: Mapping[str, Feed]) -> Setting:
-        asked = [s for key, feed in feeds.items() for s in feed.sources(self.altitude, self.mountings.get(key))]
+        found = self.shown.mountings
+        asked = [
+            source
+            for key, feed in feeds.items()
+            for source in feed.sources(self.altitude, self.mountings.get(key), found.get(key))
+        ]
         sources = [*with_slow(asked, self.shown.slow), Aiding.disturbance("gap"), Aiding.disturbance("noise")]
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
         model = with_states(self._model(), sources)
@@ -211,7 +216,7 @@ class Loop:
             return
         aids = {key: feed.looked_at(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
         shown = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
-        if shown.stamps or shown.slow or self.shown.slow:
+        if any((shown.stamps, shown.slow, shown.mountings, self.shown.slow, self.shown.mountings)):
             self._take_anew(rows, shown, feeds, log)
 
     def _glance(self, feeds: Mapping[str, Feed]) -> None:
@@ -249,8 +254,8 @@ class Loop:
         for key, feed in feeds.items():
             try:
                 sent = self._sent.setdefault(key, {})
-                mounting = self.mountings.get(key)
-                found += feed.measurements(self.altitude, mounting, sent, self.start.time, until, self.shown.on)
+                given, later = self.mountings.get(key), self.shown.mountings.get(key)
+                found += feed.measurements(self.altitude, given, sent, self.start.time, until, later, self.shown.on)
             except DataError as error:
                 self.past.note(key, str(error))
         known = {source.name for source in self.setting(feeds).sources}

@@ -281,9 +281,8 @@ class Navigator:
         if self._loop.begun:
             track = with_curve(track, self._loop.setting(self.feeds).sources)
         track = replace(track, residuals=self.past.residuals)
-        receiver = (
-            None if Gnss.key not in self.feeds else self.feeds[Gnss.key].newest(NEWEST, self._mountings.get(Gnss.key))
-        )
+        feed, found = self.feeds.get(Gnss.key), self._loop.shown.mountings.get(Gnss.key)
+        receiver = None if feed is None else feed.newest(NEWEST, self._mountings.get(Gnss.key), found)
         wanders: list[Evidence] = []
         if isinstance(receiver, Gnss):
             track, wanders = known_as_followed(track, receiver, self.altitude, self.start, self._loop.shown.slow)
