@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from tests.live.test_siblings import SWELL, Anchored
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
-from truenorth.live import GnssFeed, HeightFeed, Navigator, lasting, loop
+from truenorth.live import GnssFeed, HeightFeed, Navigator, kept, lasting, loop
 from truenorth.live.lasting import lasting_errors
 from truenorth.navigation import navigate
 from truenorth.state.layout import DV
@@ -106,6 +106,16 @@ def test_looks_change_no_bit_whatever_the_chunks_saved_or_not(tmp_path):
     assert one._loop.shown.slow
     for name in ("v_n", "position", "v_sigma", "position_sigma"):
         np.testing.assert_array_equal(getattr(one.answer.motion, name), getattr(other.answer.motion, name))
+
+
+def test_a_run_that_another_version_saved_is_refused_by_name(monkeypatch, tmp_path):
+    case = Wandering(2, duration=5.0)
+    run = case.run()
+    case.feed(run, 25)
+    path = run.save(tmp_path / "run.npz")
+    monkeypatch.setattr(kept, "FORMAT", kept.FORMAT + 1)
+    with pytest.raises(DataError, match="not a result of this version"):
+        Navigator.load(path)
 
 
 def test_a_loop_that_breaks_down_with_such_errors_goes_on_without(monkeypatch):

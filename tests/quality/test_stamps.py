@@ -6,7 +6,8 @@ import pytest
 from tests.runs import some
 from truenorth.aiding.source import Aiding
 from truenorth.core.attitude import dcm_from_rotation_vector
-from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
+from truenorth.core.earth import radii
+from truenorth.quality.stamps import scattered, scattered_by_rows, stamp_scatter, with_scatter
 from truenorth.state.layout import Layout
 from truenorth.state.track import Residuals, Track
 
@@ -95,3 +96,18 @@ def test_nothing_scatters_nothing():
     track, sources = drive(np.random.default_rng(1))
     assert scattered(sources, track, 0.0) == {}
     assert with_scatter(sources, {})[0].sigma is sources[0].sigma
+
+
+def test_by_its_own_rows_a_place_scatters_along_the_way_that_it_goes_now():
+    """Velocities that fall silent before a turn say nothing of where the vehicle goes after it."""
+    v, _ = way()
+    R_M, R_N = radii(0.8)
+    place = np.cumsum(v, axis=0)
+    place = np.stack([0.8 + place[:, 1] / R_M, place[:, 0] / (R_N * np.cos(0.8)), place[:, 2]], axis=1)
+    fixes = Aiding("GNSS position", "position", TIME, place, np.full((len(TIME), 3), 2.0))
+    for last in (len(TIME), 40):  # s, of the velocities
+        speeds = Aiding("GNSS velocity", "velocity", TIME[:last], v[:last], np.full((last, 3), 0.05))
+        added = scattered_by_rows([fixes, speeds], 0.1)
+        np.testing.assert_allclose(added["GNSS position"][50:], 0.1 * np.abs(v[50:]), atol=0.02)
+        np.testing.assert_allclose(added["GNSS velocity"][1:last], 0.1 * np.abs(np.diff(v[:last], axis=0)), atol=1e-9)
+    assert scattered_by_rows([fixes], 0.0) == {}

@@ -124,4 +124,4 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     position_row(now, C, w_b, turn, arm, lag, bias, at[AT_ARM], at[AT_LAG], at[AT_BIAS], measured, H, z)
 
 
-POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1}, swings=True, unit="m")
+POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1}, swings=True, swings_late=True, unit="m")

@@ -58,6 +58,8 @@ class Row:
         A velocity, or a place that may be late: where its sensor sits on an arm it needs the rate at its very time, too. The mean
         since the last event, T ago, is that of ``T / 2`` before: an antenna two metres away would be off by ``.5 a T l``,
         decimetres a second on rough ground.
+    swings_late : bool
+        Of those: where its delay is a state alone.
     unit : str
         Of `z`, SI: what its innovations are shown in.
     axes : tuple of str
@@ -71,6 +73,7 @@ class Row:
     width: int = 3
     instant: bool = False
     swings: bool = False
+    swings_late: bool = False
     unit: str = "m/s"
     axes: tuple[str, ...] = LEVEL_FRAME
 

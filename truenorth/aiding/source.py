@@ -145,7 +145,8 @@ class Aiding:
     def instant(self) -> bool:
         """Whether its rows need the rate at their very time."""
         on_an_arm = bool(self.lever_arm.any()) or "lever arm" in self.states
-        return self.row.instant or (self.row.swings and on_an_arm)
+        shows_swing = self.row.swings and ("lag" in self.states or not self.row.swings_late)
+        return self.row.instant or (shows_swing and on_an_arm)
 
     @property
     def over_ground(self) -> bool:

@@ -21,9 +21,11 @@ What of this normal distribution lies on the circle ``(sin d, cos d - 1)`` is th
 that were held at -1.5 to 4 deg of navigation grade, and at -15 to 15 deg of tactical, all else fitted anew, had twice its logarithm
 to 3 %, up to 25.
 
-Sigma is the second moment about the answer, all headings alike before the log, and no heading is farther than four sigmas that is
-not as unlikely. By the second moment alone, one of 400 simulated answers near east was beyond four sigmas, up to 12: where a slight
-peak is far from the other, its part of the moment is small, and who is there is many sigmas off.
+Sigma is the second moment about the answer, all headings alike before the log, and no heading nearby is farther than four sigmas
+that is not as unlikely. By the second moment alone, one of 400 simulated answers near east was beyond four sigmas, up to 12: where
+a slight peak is far from the other, its part of the moment is small, and who is there is many sigmas off. Of a heading on the
+other side of the circle the moment has what its chance is worth: a quarter of the way to it would refuse logs for one chance in
+3000.
 
 Source: B. Friedland, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14 (1969): the bias apart.
 """
@@ -50,6 +52,7 @@ from truenorth.strapdown.inertial import gravity_position
 Array = NDArray[np.float64]
 
 HEADING = PHI.stop - 1
+NEAR = math.radians(20.0)
 FOUR = 4.0  # sigmas: who is farther off, is off by a defect
 AWAY = np.geomspace(1e-7, math.pi, 600)  # rad, from a peak: one of any width has some thirty points a side
 STEP = 1e-3  # of the level rate: a difference quotient is right to its square
@@ -102,8 +105,9 @@ class HeadingCourse(NamedTuple):
         misfit -= misfit.min()
         weight = np.exp(-0.5 * misfit)
         moment = float(np.trapezoid(weight * off**2, off) / np.trapezoid(weight, off))
-        farthest = float(np.abs(off[misfit < FOUR**2]).max())
-        return max(math.sqrt(moment), farthest / FOUR), farthest
+        likely = np.abs(off[misfit < FOUR**2])
+        near = float(likely[likely < NEAR].max(initial=0.0))
+        return max(math.sqrt(moment), near / FOUR), float(likely.max())
 
 
 def course_evidence(fine: FineAlignment, position: Position) -> list[Evidence]:
@@ -116,8 +120,8 @@ def course_evidence(fine: FineAlignment, position: Position) -> list[Evidence]:
     position : Position
     """
     own = float(fine.P[HEADING, HEADING])
-    if fine.form != "velocity" or fine.system.P0[HEADING, HEADING] == 0.0:
-        return []
+    if fine.form != "velocity" or fine.system.P0[HEADING, HEADING] == 0.0 or own > NEAR**2:
+        return []  # no heading is claimed
     sigma, farthest = heading_course(fine, position).spread()
     more = math.sqrt(max(sigma**2 - own, 0.0))
     if more <= limit("negligible") * math.sqrt(own):

@@ -29,11 +29,14 @@ PLAIN: dict[str, type[Any]] = {
 PLAIN |= {kind.__name__: kind for kind in FEEDS.values()}  # type: ignore[misc]  # classes, called as functions
 
 
+FORMAT = 2  # one more whenever what a run holds changes its names
+
+
 def keep(path: str | PathLike[str], kind: str, state: Mapping[str, Any]) -> Path:
     """Write the state of a run of this kind."""
     target = Path(path)
     with atomic_path(target) as temporary, temporary.open("wb") as file:
-        write_archive({"kind": kind, **{name: _packed(value) for name, value in state.items()}}, file)
+        write_archive({"kind": kind, "format": FORMAT, **{name: _packed(value) for name, value in state.items()}}, file)
     return target
 
 
@@ -48,10 +51,10 @@ def kept(path: str | PathLike[str], kind: str, names: Collection[str] = ()) -> d
     state = read_archive(path)
     if not isinstance(state, dict) or state.pop("kind", None) != kind:
         raise DataError(f"{path}: holds no {kind}; expected a file that {kind}.save wrote")
-    if missing := sorted(set(names) - state.keys()):
-        raise DataError(
-            f"{path}: not a result of this version of Truenorth ({missing[0]}); write it again with this version"
-        )
+    missing = sorted(set(names) - state.keys())
+    if (written := state.pop("format", 1)) != FORMAT or missing:
+        what = missing[0] if missing else f"format {written}, not {FORMAT}"
+        raise DataError(f"{path}: not a result of this version of Truenorth ({what}); write it again with this version")
     return {name: _unpacked(value) for name, value in state.items()}
 
 

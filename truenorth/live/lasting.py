@@ -1,9 +1,9 @@
-"""Errors of aids that last, as the rows up to now show them: a receiver's multipath and atmosphere, a wheel's slip.
+"""What the rows up to now show of the aids: errors that last, how late they are, and how much stamps scatter.
 
 :func:`truenorth.navigate` finds them by passes over the whole log (:mod:`truenorth.navigation.passes`). A running answer makes the
 same passes at a few times: they are then states of its loop. Of a receiver whose rows are too few to show them, they are taken as
 is usual of receivers. Taken for white, errors of a fix that last for a minute, and of a velocity that last for seconds, pull at the
-velocity of an answer: it was up to 5 sigmas off.
+velocity of an answer: it was up to 5 sigmas off. A delay of many of its sigmas is found in the same passes.
 """
 
 from __future__ import annotations
@@ -38,8 +38,11 @@ from truenorth.state.state import Start
 
 # s after the first rows of an aid: half a minute shows how stamps scatter, a minute is the least that shows how errors last
 LOOKS = (5.0, 30.0, 75.0, 150.0)
-GLANCE = 15.0  # s, between two glances at innovations alone
-AHEAD = 2.0  # s, of a measurement before its time: less its delay, as it is known by then, it may be due
+GLANCE = 15.0  # s, between two glances at innovations alone, at ..
+NEWEST = 600  # of them
+AHEAD = (
+    2.0  # s, of a measurement before its time: it may be due earlier by its delay, and rows come up to a second late
+)
 
 
 class Shown(NamedTuple):
@@ -65,11 +68,9 @@ def next_look(last: float, begun: Sequence[float]) -> float:
 
 def next_glance(last: float, begin: float, row: float) -> float:
     """The time of the first glance after one, s, of a run from `begin` that has a row of this time; infinity: it has none."""
-    return (
-        begin + GLANCE * max(math.ceil((row - begin) / GLANCE), round((last - begin) / GLANCE) + 1)
-        if row < math.inf
-        else row
-    )
+    if row == math.inf:
+        return row
+    return begin + GLANCE * max(math.ceil((row - begin) / GLANCE), round((last - begin) / GLANCE) + 1)
 
 
 def lasting_errors(
@@ -80,7 +81,7 @@ def lasting_errors(
     spec: ImuSpec,
     aids: Mapping[str, Aid | None],
 ) -> Shown:
-    """Errors of aids that last, by their sources' names, and how much stamps scatter.
+    """Errors of aids that last, by their sources' names, how late the aids are, and how much stamps scatter.
 
     Parameters
     ----------

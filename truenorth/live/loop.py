@@ -21,7 +21,7 @@ from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.bridges import Gap, bridged, unbroken
 from truenorth.live.feed import Feed
-from truenorth.live.lasting import AHEAD, GLANCE, Shown, lasting_errors, next_glance, next_look
+from truenorth.live.lasting import AHEAD, NEWEST, Shown, lasting_errors, next_glance, next_look
 from truenorth.live.log import Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
@@ -80,6 +80,7 @@ class Loop:
         self.shown = Shown({})  # of the aids, by the last look
         self._looked = -np.inf  # s, when it looked back last
         self._glanced = start.time  # s, and at innovations alone
+        self._glances = 0
         self._waiting: list[Array] = []
         self._anew()
 
@@ -223,9 +224,9 @@ class Loop:
         """Count the scatter of a receiver's stamps from now on, where innovations show it by now: no row is taken anew."""
         if self.shown.stamps or self.failure or (track := self.past.track) is None:
             return
-        looks = round((self._glanced - self.start.time) / GLANCE)
-        seen = replace(track, residuals=self.past.residuals)
-        if stamps := stamp_scatter(seen, self.setting(feeds).sources, 0.0, looks):
+        self._glances += 1
+        seen = replace(track, residuals=self.past.newest(NEWEST))
+        if stamps := stamp_scatter(seen, self.setting(feeds).sources, 0.0, self._glances):
             said = [*self.shown.said, *stamp_notes(stamps)]
             self.shown = self.shown._replace(stamps=stamps, said=said, since=self._glanced + AHEAD)
 

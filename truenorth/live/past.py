@@ -58,6 +58,10 @@ class Past:
         """The newest innovations of each source."""
         return tuple(self._residuals.values())
 
+    def newest(self, count: int) -> tuple[Residuals, ...]:
+        """So many of them."""
+        return tuple(_newest(r, count) for r in self.residuals)
+
     def with_end(self, end: Track) -> Track:
         """The thinned track, and a last epoch."""
         track = self.track
@@ -85,7 +89,10 @@ def _together(tracks: list[Track]) -> Track:
 def _joined(first: Residuals | None, second: Residuals) -> Residuals:
     if first is None:
         return second
-    parts: dict[str, Any] = {}
-    for name in RESIDUALS:
-        parts[name] = np.concatenate([getattr(first, name), getattr(second, name)])[-MOST_ROWS:]
-    return replace(second, **parts)
+    parts: dict[str, Any] = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in RESIDUALS}
+    return _newest(replace(second, **parts), MOST_ROWS)
+
+
+def _newest(r: Residuals, count: int) -> Residuals:
+    parts: dict[str, Any] = {name: getattr(r, name)[-count:] for name in RESIDUALS}
+    return replace(r, **parts)

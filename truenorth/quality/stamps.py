@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.source import Aiding
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import radii
+from truenorth.quality.slow_aids import FIXES, SPEEDS
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
 
@@ -34,6 +35,7 @@ SLOW = 1e-9  # m/s, m/s^2 or rad/s: rates that have no direction, and are looked
 ANYWHERE = np.array([1.0, 0.0, 0.0])
 SHORTEST = 1e-3  # s, of a step
 STEP = 0.5  # s, over which the motion of a vehicle is steady
+LATELY = 2.0 * STEP
 MOST = 25.0  # square of a normalised difference, that is an outlier beyond
 
 
@@ -71,13 +73,16 @@ def scattered_by_rows(aiding: Sequence[Aiding], sigma: float) -> dict[str, Array
     """The same without a track: by the motion that a receiver's rows show themselves, each by those up to it alone."""
     if sigma == 0.0:
         return {}
-    moves = next((s for s in aiding if s.name == "GNSS velocity"), None)
+    moves = next((s for s in aiding if s.name == SPEEDS), None)
     found = {}
     for source in aiding:
-        if source.name == "GNSS velocity":
+        if source.name == SPEEDS:
             rate = _since(source.time, source.measured)
-        elif source.name == "GNSS position":
-            rate = _since(source.time, _metres(source.measured)) if moves is None else _held(source.time, moves)
+        elif source.name == FIXES:
+            rate = _since(source.time, _metres(source.measured))
+            if moves is not None:
+                held, fresh = _held(source.time, moves)
+                rate = np.where(fresh[:, None], held, rate)
         else:
             continue
         found[source.name] = sigma * np.abs(np.nan_to_num(rate))
@@ -91,13 +96,14 @@ def with_scatter(aiding: Sequence[Aiding], added: Mapping[str, Array]) -> list[A
 
 def _since(time: Array, values: Array) -> Array:
     """(M, 3) rate of change of values over the last second, or the rows since, where there are fewer."""
-    before = np.maximum(time - 2.0 * STEP, time[0])
+    before = np.maximum(time - LATELY, time[0])
     return (values - _at(before, time, values)) / np.maximum(time - before, SHORTEST)[:, None]
 
 
-def _held(time: Array, rows: Aiding) -> Array:
-    """(M, 3) the last of the rows up to each time; before the first one that."""
-    return rows.measured[np.maximum(np.searchsorted(rows.time, time, side="right") - 1, 0)]
+def _held(time: Array, rows: Aiding) -> tuple[Array, NDArray[np.bool_]]:
+    """(M, 3) the last of the rows up to each time, and whether it is of that moment: a turn makes another of an old velocity."""
+    last = np.maximum(np.searchsorted(rows.time, time, side="right") - 1, 0)
+    return rows.measured[last], np.abs(time - rows.time[last]) <= LATELY
 
 
 def _metres(place: Array) -> Array:
@@ -135,8 +141,8 @@ def _at(time: Array, of: Array, values: Array) -> Array:
 
 # What a stamp multiplies, (M, 3) at some times: velocity (m/s) of a position, acceleration (m/s^2) of a velocity, rate (rad/s).
 SOURCES: dict[str, Callable[[Track, Array], Array]] = {
-    "GNSS velocity": _acceleration,
-    "GNSS position": _velocity,
+    SPEEDS: _acceleration,
+    FIXES: _velocity,
     "master velocity": _acceleration,
     "master position": _velocity,
     "master attitude": _turn,

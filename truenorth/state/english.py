@@ -17,8 +17,8 @@ SENTENCES = {
     "heading.paid": "after {pays_until:.0f} s more time stopped paying: the floor was the larger part",
     "heading.pays": "more time pays until about {pays_until:.0f} s; the log has {duration:.0f} s",
     "heading.curved": (
-        "headings up to {off:deg|.1f} deg away are less likely by less than four sigmas: sigma has them in. Where an IMU is turned "
-        "on and on one way about an axis that lies nearly east and west, heading hardly shows: turn it both ways in turn"
+        "headings up to {off:deg|.1f} deg away are less likely by less than four sigmas, and sigma has them in by their chance: of "
+        "an IMU that is turned on and on one way, a scale factor of a gyro makes up for the difference; turn it both ways in turn"
     ),
     "heading.rivals": (
         "a heading {off:deg|.0f} deg away explains the log as well: the IMU is turned on and on one way about an axis that is not "
