@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -47,6 +48,17 @@ def test_an_axis_that_stands_on_one_value_shows_no_noise():
     record = base(arw=6e-4, duration=300.0)
     gyro = np.where((record.time < 15.0)[:, None], record.gyro[0], record.gyro)
     assert motion_summary(ImuRecord(record.time, gyro, record.accel)).still_fraction == 1.0
+
+
+@pytest.mark.parametrize("phase", [0.0, 60.0])
+def test_a_sway_of_as_many_seconds_as_values_goes_nowhere(phase):
+    """Of 4 s, whose median is off its mean by up to half its amplitude: a base that sways by 4 cm was seen to gain speed."""
+    record = base(arw=1e-6, vrw=1e-5, duration=240.0)
+    sway = 0.16 * np.sin(2.0 * np.pi * record.time / 4.0 + np.radians(phase))
+    assert motion_summary(replace(record, accel=record.accel + np.outer(sway, [1.0, 0.3, 0.5]))).moves_at is None
+    start = np.where((record.time > 100.0) & (record.time < 105.0), 0.3, 0.0)
+    moves = motion_summary(replace(record, accel=record.accel + np.outer(sway + start, [1.0, 0.3, 0.5]))).moves_at
+    assert moves == pytest.approx(100.0, abs=15.0)  # the sway before it is in the same stretch
 
 
 @pytest.mark.parametrize("arw", [1e-5, 6e-4])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.motion_fit import search, with_guess
 from truenorth.alignment.motion_likelihood import Series, Walks
-from truenorth.alignment.swing_fit import fit_swing
+from truenorth.alignment.swing_fit import fit_swing, long_enough
 from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas
@@ -79,6 +79,7 @@ class MotionFilter:
 
     stale = False
     likely = -math.inf  # twice the log-likelihood of the last pass
+    turns = slice(0, 0)  # states of the arm of a base that swings on lines
 
     def __init__(self, residual: Array, interval: float, walks: Walks, fits: int = 1, *, poor: bool = False) -> None:
         self.interval, self.walks, self.fits, self.passes = interval, walks, fits, 0
@@ -120,6 +121,21 @@ class MotionFilter:
     def full(self) -> LinearSystem:
         """The last system, with the motion as fitted."""
         return with_motion(self.base, self.interval, self.motion)
+
+    def likeliest(self, motion: Sequence[AxisMotion]) -> float:
+        """Twice the log-likelihood of the last system with another log's motion, or with what a fit makes of that: the larger."""
+        tried = motion, self.fit(self.base.z, motion)
+        return max(self._likelihood(m) for m in tried)
+
+    def on_lines(self) -> float:
+        """Twice the log-likelihood of the last system of a base that swings on lines as well; -inf of too short a log."""
+        if not long_enough(self.interval * len(self.base.z)):
+            return -math.inf
+        turns = self.base.H[:, :, self.turns]
+        return self._likelihood(_no_quieter(fit_swing(self.base, self.interval, self.walks, self.motion, turns)))
+
+    def _likelihood(self, motion: Sequence[AxisMotion]) -> float:
+        return 2.0 * float(kalman(with_motion(self.base, self.interval, motion)).log_likelihood)
 
     def without(self, seen: Array) -> tuple[float, Array]:
         """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""

@@ -218,7 +218,7 @@ def _unturn(angles: Any, vectors: Any, found: Any) -> None:
 
 
 def acceleration(steady: Array, body: Array) -> tuple[Array, Array]:
-    """(m,) acceleration of each second and (m,) its norm averaged, as a vector, over 10 s.
+    """(m,) acceleration of each second and (m,) its norm averaged, as a vector, over 10 s: the least, whatever the level.
 
     The smallest of three deviations of the specific force over 31 s: in axes that do not turn, from the
     median and from a line (a gyro bias makes the level drift); in body axes, from the median (there, a turned
@@ -228,8 +228,31 @@ def acceleration(steady: Array, body: Array) -> tuple[Array, Array]:
     drifting = steady - slope
     deviations = np.stack([steady - level, drifting, body - _running_median(body)])
     size = np.linalg.norm(deviations, axis=1)
-    gain = np.linalg.norm(box_mean(np.where(size[0] < size[1], deviations[0], drifting), WINDOW), axis=0)
-    return size.min(axis=0), gain
+    over = np.where(size[0] < size[1], deviations[0], drifting)
+    means = box_mean(over, WINDOW), _beyond(steady), _beyond(drifting)
+    return size.min(axis=0), np.min([_lengths(mean) for mean in means], axis=0)
+
+
+def _lengths(x: Array) -> Array:
+    """(m,) of vectors (3, m)."""
+    return np.asarray(np.linalg.norm(x, axis=0))
+
+
+def _beyond(signal: Array) -> Array:
+    """(3, m) mean of some 10 s around each second over that of the rest of the 31 s around it; of a short record over zero.
+
+    A level that is a median is off where few values come again and again: of a sway of 4 s, whose seconds have as many, by up to
+    its amplitude. That is in both means. A mean over 10 s leaves an eighth of a sway of 4 s, that of means over 5 and
+    then 6 s a third of that, and of a start as much as the one over 10 s: of 90 bases that start by .1 to 2.5 m/s^2 over 2 to 12 s
+    the same 68 are seen to move, of 240 that sway by centimetres fewer.
+    """
+    seconds = signal.shape[1]
+    if seconds < LEVEL_WINDOW:
+        return box_mean(signal, WINDOW)
+    five = _neighbours(signal, WINDOW // 2) / (WINDOW // 2)
+    inner = (_neighbours(five, WINDOW // 2 + 1) / (WINDOW // 2 + 1)).take(offset(seconds, WINDOW), axis=1)
+    rest = (LEVEL_WINDOW * box_mean(signal, LEVEL_WINDOW) - WINDOW * inner) / (LEVEL_WINDOW - WINDOW)
+    return np.asarray(inner - rest)
 
 
 def _running_level(signal: Array) -> tuple[Array, Array]:
