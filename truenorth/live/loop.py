@@ -139,10 +139,7 @@ class Loop:
         """Take the rows and measurements up to a time, and look back where it is time to."""
         while not self.failure:
             look = next_look(self._looked, self._begun(feeds, log))
-            coming = min((float(rows[0, 0]) for rows in self._waiting), default=np.inf)
-            row = self.end if self.end > self._glanced else coming
-            glance = next_glance(self._glanced, self.start.time, row)
-            if (at := min(look, glance)) >= until:
+            if (at := min(look, self._next_glance())) >= until:
                 break
             self._advance(at, feeds, log)
             if at == look:
@@ -156,6 +153,12 @@ class Loop:
         if self._more and (rows := self._taken(log)) is not None:
             self._take_anew(rows, self.shown, feeds, log)
             self._more = False
+
+    def _next_glance(self) -> float:
+        """The time of the next glance, s: of rows that were taken since the last one, or else of those that wait."""
+        waiting = (float(rows[0, 0]) for rows in self._waiting)
+        row = self.end if self.end > self._glanced else min(waiting, default=np.inf)
+        return next_glance(self._glanced, self.start.time, row)
 
     def _begun(self, feeds: Mapping[str, Feed], log: Log) -> list[float]:
         """When the rows of each aid begin that the loop takes, s."""
