@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.navigation.test_scattered_stamps import FLOWN, flown, running
-from truenorth.live import Navigator
-from truenorth.state.mounting import Mounting
+from truenorth.live import GnssFeed, Navigator
+from truenorth.state.mounting import Clock, Mounting
 
 
 def flown_late(seed, late, said=0.03):
@@ -53,3 +53,14 @@ def test_a_feed_that_says_how_it_sits_is_as_late_as_found_all_the_same():
     assert isinstance(own.feeds["gnss"].mounting, Mounting)
     assert own._loop.shown.mountings["gnss"].latency == pytest.approx(0.3, abs=0.05)
     assert own.answer.status == "navigated"
+
+
+def test_each_place_and_velocity_is_given_away_when_it_comes_however_late_either_is():
+    """Places that waited for velocities of another moment came too late, by the chunks in which the rows did."""
+    feed, sent, given = GnssFeed(), {}, []
+    found = Mounting(latency=0.5, latency_sigma=0.1, velocities=Clock(0.0, 0.1))
+    for k in range(40):
+        feed.push(0.1 * k, 0.8 + 3e-8 * k, 0.2, 100.0, v_n=np.array([0.0, 1.9 + 1e-3 * k, 0.0]))
+        rows = feed.measurements("gnss", None, sent, -np.inf, found=found)
+        given.append({source.name: len(source.time) for source in rows})
+    assert given[2:] == [{"GNSS position": 1, "GNSS velocity": 1}] * 38

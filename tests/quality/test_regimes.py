@@ -95,6 +95,21 @@ def test_starting_to_drive_is_moving():
     assert first.stop == pytest.approx(66.0, abs=1.5)
 
 
+@pytest.mark.parametrize(("acceleration", "duration"), [(0.3, 13.3), (0.5, 16.0), (0.7, 14.3)])
+def test_a_start_is_seen_within_a_second(acceleration, duration):
+    """What is cut off there holds no motion: a second later, 24 of 24 logs at rest were refused as those of bases that move."""
+    t = 0.01 * np.arange(1, 10_001)
+    force = np.zeros((len(t), 3))
+    force[:, 2] = 9.81
+    force[:, 1] = acceleration * (np.clip((t - 60.0) / 0.5, 0.0, 1.0) - np.clip((t - 60.0 - duration) / 0.5, 0.0, 1.0))
+    rng = np.random.default_rng(4)
+    noisy = force + 1e-3 * rng.standard_normal(force.shape)
+    record = ImuRecord(t, 1e-5 * rng.standard_normal(force.shape), noisy, kind="rates")
+    moves = motion_summary(record).moves_at
+    assert moves is not None
+    assert moves == pytest.approx(60.5, abs=0.6)
+
+
 def test_a_turn_is_rotating_and_knows_its_bounds():
     record = base(duration=120.0)
     turn = np.where((record.time > 40) & (record.time <= 70), np.radians(6.0), 0.0)

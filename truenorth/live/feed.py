@@ -229,7 +229,7 @@ class Feed(ABC):
         late = 0.0 if found is None or not len(rows) else float(found.late_at(rows[-1, 0]))
         oldest = int(np.searchsorted(rows[:, 0], min(sent.values(), default=since) + late))
         first = max(0, oldest // STEP - 1) * STEP
-        if len(rows) - first < 2 or rows[-1, 0] - late <= max(sent.values(), default=since):
+        if len(rows) - first < 2 or rows[-1, 0] - late <= min(sent.values(), default=since):
             return []
         measured = []
         window = self.fresh(rows[first:])

@@ -22,6 +22,7 @@ from truenorth.errors.axes import axis_sigma
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import delay_notes, delays_found
+from truenorth.estimate.moments import explained_by_two
 from truenorth.estimate.slow_fit import usual
 from truenorth.navigation.passes import delayed, with_scattered_stamps, with_slow_errors
 from truenorth.navigation.plan import Plan
@@ -35,6 +36,7 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
+from truenorth.state.track import Track
 
 # s after the first rows of an aid: half a minute shows how stamps scatter, a minute is the least that shows how errors last
 LOOKS = (5.0, 30.0, 75.0, 150.0)
@@ -108,10 +110,7 @@ def lasting_errors(
         askew = axis_sigma(spec)[0].max()
         plan = Plan(record, start, model, altitude, disturbances, FINE, every, askew, slow=unseen)
         track = plan.run(plan.sources(given))
-        asked, given = given, delayed(plan, given, track)
-        late = {key: given[key].mounting for key in SENSORS if given.get(key) is not asked.get(key)}
-        if late:
-            track = plan.run(plan.sources(given))
+        given, track, late = _as_late_as_shown(plan, given, track)
         plan, track = with_scattered_stamps(plan, given, track)
         said: Sequence[Evidence] = ()
         if any(_seconds(source) >= LEAST_ROWS for source in sources):
@@ -120,6 +119,19 @@ def lasting_errors(
         return Shown(unseen)
     delays = delay_notes(delays_found(track, {SENSORS[key][0]: mounting for key, mounting in late.items()}))
     return Shown(plan.slow, plan.stamps, [*delays, *stamp_notes(plan.stamps), *said], mountings=late)
+
+
+def _as_late_as_shown(
+    plan: Plan, given: dict[str, Any], track: Track
+) -> tuple[dict[str, Any], Track, dict[str, Mounting]]:
+    """The aids as late as a track shows them where that explains the rows better, their track, and how those sit that are."""
+    later = delayed(plan, given, track)
+    if later is given:
+        return given, track, {}
+    other = plan.run(plan.sources(later))
+    if not explained_by_two(other, track, delays=True):
+        return given, track, {}
+    return later, other, {key: later[key].mounting for key in SENSORS if later.get(key) is not given.get(key)}
 
 
 def _seconds(source: Aiding) -> int:

@@ -52,6 +52,9 @@ TURN_ANGLE = np.radians(3.0)  # net angle from which a turn is called rotating
 TURN_SHARE = 0.4  # of the RMS rate that is net rotation; a sway of 15 s period has at most 0.33
 TURN_WAY = 0.7  # of the way that the attitude goes, the same: of a turn of a second at rest all of it, of that sway at most .37
 MOVING_ACCELERATION = 0.08  # m/s^2 over one second; tilt error, bias and people in the car stay below 0.05
+LATER = (
+    2  # s, at the most, of what surely gains speed: of 72 starts a second or two later than the coarser mean sees them
+)
 LEAST_GAIN = 0.04  # m/s^2 over WINDOW: waves that come and go within it leave less, a start of .4 m/s more
 NOISY_BIAS = 200.0  # sqrt(Hz): the same of a noisier one, in its noise ...
 LARGEST_BIAS = 1.0  # m/s^2: ... at the most
@@ -220,7 +223,7 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     gyro = rates[:3] - bias[:, None]
     rate = second_means(gyro, per_second)
     steady = unturned(gyro * interval, rates[3:])  # specific force in axes that do not turn
-    motion, gain = acceleration(second_means(steady, per_second), force)
+    motion, gain, surely = acceleration(second_means(steady, per_second), force)
 
     turned = np.minimum(1.0, np.linalg.norm(box_mean(rate, LEVEL_WINDOW), axis=0) * LEVEL_WINDOW)
     walked = angle_noise[:, None] * _walk(seconds)
@@ -233,12 +236,17 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
         active=_in_every_window(active, seconds),
         sways=around * np.sqrt(2.0) > SWAY_ANGLE,
         accelerates=motion > np.hypot(MOVING_ACCELERATION, 3.0 * noisy) + biased * turned,
-        gains=gain > LEAST_GAIN,
-        gains_speed=gain > SWAY_ACCELERATION,
+        gains=_near(surely > LEAST_GAIN, gain > LEAST_GAIN),
+        gains_speed=_near(surely > SWAY_ACCELERATION, gain > SWAY_ACCELERATION),
         rate_noise=length_of(angle_noise),
     )
     time = record.time[0] - record.interval + per_second * interval * np.arange(1, seconds + 1)
     return MotionSummary(time, kind, rate.T, force.T, motion, around, bias, angle_noise, _stretches(time, kind, record))
+
+
+def _near(surely: NDArray[np.bool_], maybe: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(m,) seconds in which a base gains speed by a coarser mean, near those in which it surely does: that sees its start later."""
+    return np.asarray(maybe & (box_mean(surely[None] * 1.0, 2 * LATER + 1)[0] > 0.0))
 
 
 def _walk(seconds: int) -> float:

@@ -217,8 +217,8 @@ def _unturn(angles: Any, vectors: Any, found: Any) -> None:
         found[0, k], found[1, k], found[2, k] = rotate(q, (vectors[0, k], vectors[1, k], vectors[2, k]))
 
 
-def acceleration(steady: Array, body: Array) -> tuple[Array, Array]:
-    """(m,) acceleration of each second and (m,) its norm averaged, as a vector, over 10 s: the least, whatever the level.
+def acceleration(steady: Array, body: Array) -> tuple[Array, Array, Array]:
+    """(m,) acceleration of each second, (m,) its norm averaged, as a vector, over 10 s, and (m,) the least of that by any level.
 
     The smallest of three deviations of the specific force over 31 s: in axes that do not turn, from the
     median and from a line (a gyro bias makes the level drift); in body axes, from the median (there, a turned
@@ -229,8 +229,9 @@ def acceleration(steady: Array, body: Array) -> tuple[Array, Array]:
     deviations = np.stack([steady - level, drifting, body - _running_median(body)])
     size = np.linalg.norm(deviations, axis=1)
     over = np.where(size[0] < size[1], deviations[0], drifting)
-    means = box_mean(over, WINDOW), _beyond(steady), _beyond(drifting)
-    return size.min(axis=0), np.min([_lengths(mean) for mean in means], axis=0)
+    gain = _lengths(box_mean(over, WINDOW))
+    least = np.minimum(gain, np.minimum(_lengths(_beyond(steady)), _lengths(_beyond(drifting))))
+    return size.min(axis=0), gain, least
 
 
 def _lengths(x: Array) -> Array:
