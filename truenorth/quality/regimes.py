@@ -246,7 +246,7 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
 
 def _near(surely: NDArray[np.bool_], maybe: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(m,) seconds in which a base gains speed by a coarser mean, near those in which it surely does: that sees its start later."""
-    return np.asarray(maybe & (box_mean(surely[None] * 1.0, 2 * LATER + 1)[0] > 0.0))
+    return np.asarray(maybe & (box_mean(surely[None].astype(np.float64), 2 * LATER + 1)[0] > 0.0))
 
 
 def _walk(seconds: int) -> float:
