@@ -71,7 +71,10 @@ def _facts(result: Navigation) -> list[tuple[str, str]]:
         (
             _("Log"),
             _("{source}, {start:.5g} to {stop:.5g} {unit}").format(
-                source=result.source, start=clock(result.time[0]), stop=clock(result.time[-1]), unit=clock.label
+                source=result.source,
+                start=round(float(clock(result.time[0])), 9),  # the start less a step may leave 1e-15
+                stop=clock(result.time[-1]),
+                unit=clock.label,
             ),
         ),
         (_("Distance"), f"{short(result.distance / scale)} {unit}"),
