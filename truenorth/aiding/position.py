@@ -9,7 +9,9 @@ tau (the measurement shows the antenna as it was tau before its time stamp):
 
 What is late is the antenna, not the vehicle: on the roof of a tractor that rolls it moves by as much as the tractor drives, and of
 a fix of a centimetre .02 s of that are two. Rates are noisy, and what is within their noise tells of no delay: the column of the
-delay has a rate of its own, whose noise is not in z.
+delay has a rate of its own, whose noise is not in z. And what is linear in a delay is so of one that is short against the swing: of
+a receiver .8 s late on a cart that shakes its mast once a second, it says nothing of where the mast was. Such a delay is found by
+the vehicle's way alone, and the next pass begins with it.
 
 Rows are in ENU. A velocity is measured in the axes at the true place; those at the computed place are turned against them
 by the convergence of the meridians, ``tan L dp_E/R`` about up.
@@ -30,6 +32,7 @@ from truenorth.state.now import NOW_C, NOW_EARTH, NOW_OTHER_RATE, NOW_RATE_NOISE
 from truenorth.strapdown.wander import azimuth, curvature, earth_axis
 
 _PHI, _DV, _DP, _BG = 0, 3, 6, 9
+_SHORT = 0.25  # s
 
 
 @compiled
@@ -118,9 +121,11 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     C = matrix_of(now, NOW_C)
     still, other = times_back(C, vector_of(now, NOW_EARTH)), vector_of(now, NOW_OTHER_RATE)
     turn = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
-    seen = beyond_noise(turn, now[NOW_RATE_NOISE])
+    part = 1.0 / (1.0 + (lag / _SHORT) ** 4)
+    seen = part * beyond_noise(turn, now[NOW_RATE_NOISE])
     turn = (seen * turn[0], seen * turn[1], seen * turn[2])
     w_b = vector_of(now, NOW_TURN)
+    w_b = (part * w_b[0], part * w_b[1], part * w_b[2])
     position_row(now, C, w_b, turn, arm, lag, bias, at[AT_ARM], at[AT_LAG], at[AT_BIAS], measured, H, z)
 
 
