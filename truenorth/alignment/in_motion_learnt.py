@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from truenorth.estimate.latency import delay_notes
 from truenorth.quality.aid_noise import LEAST_FACTOR, noise_notes
+from truenorth.quality.stamps import stamp_notes
 from truenorth.quality.swing import VELOCITIES
 from truenorth.state.evidence import Evidence, note
 
@@ -23,11 +24,6 @@ def differs(before: float, after: float) -> bool:
     """Whether a scatter of stamps has changed by what matters."""
     both = min(before, after), max(before, after)
     return both[1] > 0.0 and (both[0] == 0.0 or math.log(both[1] / both[0]) > math.log(LEAST_FACTOR))
-
-
-def stamp_notes(scatter: float) -> list[Evidence]:
-    """That a receiver's stamps scatter by so much, s, one sigma; nothing of none."""
-    return [note("noise.stamps", name="GNSS", size=scatter)] if scatter > 0.0 else []
 
 
 def learnt_evidence(

@@ -16,7 +16,6 @@ import numpy as np
 
 from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
-from truenorth.alignment.in_motion_learnt import stamp_notes
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.axes import axis_sigma
 from truenorth.errors.model import InsModel
@@ -30,7 +29,7 @@ from truenorth.navigation.procedure import FINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.second_look import SENSORS
 from truenorth.quality.slow_aids import FIXES, LEAST_ROWS, Slow, with_slow
-from truenorth.quality.stamps import scattered_by_rows, with_scatter
+from truenorth.quality.stamps import scattered_by_rows, stamp_notes, with_scatter
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
@@ -42,9 +41,7 @@ from truenorth.state.track import Track
 LOOKS = (5.0, 30.0, 75.0, 150.0)
 GLANCE = 15.0  # s, between two glances at innovations alone, at ..
 NEWEST = 600  # of them
-AHEAD = (
-    2.0  # s, of a measurement before its time: it may be due earlier by its delay, and rows come up to a second late
-)
+AHEAD = 2.0  # s, of a measurement before its time: a delay makes it due earlier, and rows come up to a second late
 
 
 class Shown(NamedTuple):

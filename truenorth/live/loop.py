@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
-from truenorth.alignment.in_motion_learnt import stamp_notes
 from truenorth.core.errors import DataError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import LoopState, Setting
@@ -31,7 +30,7 @@ from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.start import force_at_rest
 from truenorth.quality.slow_aids import with_slow
-from truenorth.quality.stamps import stamp_scatter
+from truenorth.quality.stamps import stamp_notes, stamp_scatter
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.mounting import Mounting

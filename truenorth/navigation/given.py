@@ -134,6 +134,11 @@ def looked_at(given: Mapping[str, Any]) -> dict[str, Mounting]:
     return found | {key: a.mounting for key, a in given.items() if getattr(a, "mounting", None) is not None}
 
 
+def ungated(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The aids without gates: what is wrong rejects the rows that would show what is right."""
+    return mounted_as(given, {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()})
+
+
 def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:
     """How height is kept with these aids, and what is to be said of it.
 

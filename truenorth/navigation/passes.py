@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Aid, Gnss
-from truenorth.alignment.in_motion_learnt import differs, stamp_notes
+from truenorth.alignment.in_motion_learnt import differs
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.estimate.slow_fit import fitted
-from truenorth.navigation.given import looked_at, mounted_as
+from truenorth.navigation.given import ungated
 from truenorth.navigation.plan import Plan
 from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
 from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, slow_errors
-from truenorth.quality.stamps import scattered, stamp_scatter
+from truenorth.quality.stamps import scattered, stamp_notes, stamp_scatter
 from truenorth.quality.swing import (
     UNSEEN_ARM,
     is_swung_late,
@@ -201,10 +201,9 @@ def _all_shown(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) ->
         or antenna.lever_arm_sigma > 0.0
     ):
         return plan, given, track
-    shown = replace(plan, unseen=0.0, scattered={})
-    free = {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()}
+    shown = replace(plan, unseen=0.0, swung={})
     try:
-        later = delayed(shown, given, shown.run(shown.sources(mounted_as(given, free))))
+        later = delayed(shown, given, shown.run(shown.sources(ungated(given))))
         quiet = shown.run(shown.sources(later), smooth=smooth)
     except DataError:  # the filter broke down
         return plan, given, track
@@ -240,7 +239,7 @@ def _with_swing(plan: Plan, given: dict[str, Any], track: Track, arm: Array, sha
     """The plan with a share of the swing of an antenna on an arm in the noise of its velocities."""
     fixes = [source for source in plan.sources(given) if source.name == SPEEDS]
     added = {source.name: share * swing(track, plan.record, arm, source.time) for source in fixes}
-    return replace(plan, unseen=share, scattered=added)
+    return replace(plan, unseen=share, swung=added)
 
 
 def with_scattered_stamps(
@@ -250,15 +249,13 @@ def with_scattered_stamps(
 
     Gates keep out the rows that would show it: a track that is lost is looked at without.
     """
-    free = mounted_as(given, {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()})
     for _ in range(NOISE_PASSES):
         aiding = [source for source in plan.sources(given) if source.name in (FIXES, SPEEDS)]
         try:
-            seen = plan.run(plan.sources(free)) if lost(track) else track
+            seen = plan.run(plan.sources(ungated(given))) if lost(track) else track
             sigma = stamp_scatter(seen, aiding, plan.stamps)
-            if sigma == 0.0 or not differs(
-                plan.stamps, sigma
-            ):  # what explains a log is kept: with it, less is to be explained
+            # What explains a log is kept: with it, less is left to be explained.
+            if sigma == 0.0 or not differs(plan.stamps, sigma):
                 break
             other = replace(plan, stamps=sigma, stamped=scattered(aiding, seen, sigma))
             quiet = other.run(other.sources(given), smooth=smooth)
@@ -356,7 +353,5 @@ def delayed(plan: Plan, given: dict[str, Any], track: Track) -> dict[str, Any]:
         if later is found:
             break
         found = later
-        # No gates: a delay that is wrong rejects what would show the right one.
-        free = {key: replace(m, gate=0.0) for key, m in looked_at(found).items()}
-        track = plan.run(plan.sources(mounted_as(found, free)))
+        track = plan.run(plan.sources(ungated(found)))
     return found

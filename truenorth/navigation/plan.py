@@ -43,15 +43,15 @@ class Plan:
     swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
     late: bool = False  # what the receiver shows late is its antenna's slow swing, too
     unseen: float = 0.0  # share of that swing which is in their noise
-    scattered: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
+    swung: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
     stamps: float = 0.0  # s, one sigma of the receiver's stamps, as innovations have shown it
-    stamped: Mapping[str, Array] = field(default_factory=dict)  # what that adds
+    stamped: Mapping[str, Array] = field(default_factory=dict)  # what that adds to its sigmas
 
     def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
         """Measurements of all aids."""
         said = [source for a in given.values() for source in a.sources(self.altitude)]
         loud = louder(with_slow(said, self.slow), self.factors)
-        return with_scatter(with_scatter(loud, self.scattered), self.stamped)
+        return with_scatter(with_scatter(loud, self.swung), self.stamped)
 
     def run(self, sensors: Sequence[Aiding], smooth: bool = False) -> Track:
         """Filter with these measurements; smooth once that is asked for (:meth:`Track.whole`): it takes ten times as long."""

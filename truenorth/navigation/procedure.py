@@ -41,10 +41,10 @@ from truenorth.navigation.given import (
     late_rows,
     logs_of_speed,
     looked_at,
-    mounted_as,
     record_of,
     said_of,
     taken_over,
+    ungated,
     with_rows,
 )
 from truenorth.navigation.gyro_moment import gyros_of_another_moment
@@ -268,8 +268,7 @@ def _by_specification(
 
 def _about_its_heading(plan: Plan, given: Mapping[str, Aid]) -> Plan:
     """The plan from the heading that the log shows, where its start was unsure (:mod:`truenorth.navigation.recentred`)."""
-    free = {key: replace(mounting, gate=0.0) for key, mounting in looked_at(given).items()}
-    aiding = {True: plan.sources(given), False: plan.sources(mounted_as(given, free))}
+    aiding = {True: plan.sources(given), False: plan.sources(ungated(given))}
     run = lambda at, gated: replace(plan, start=at).run(aiding[gated], smooth=not gated)  # noqa: E731
     return replace(plan, start=recentred(run, plan.start)) if aiding[True] else plan
 

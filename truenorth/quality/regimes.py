@@ -52,9 +52,7 @@ TURN_ANGLE = np.radians(3.0)  # net angle from which a turn is called rotating
 TURN_SHARE = 0.4  # of the RMS rate that is net rotation; a sway of 15 s period has at most 0.33
 TURN_WAY = 0.7  # of the way that the attitude goes, the same: of a turn of a second at rest all of it, of that sway at most .37
 MOVING_ACCELERATION = 0.08  # m/s^2 over one second; tilt error, bias and people in the car stay below 0.05
-LATER = (
-    2  # s, at the most, of what surely gains speed: of 72 starts a second or two later than the coarser mean sees them
-)
+LATER = 2  # s, at the most, by which what surely gains speed is seen later: of 72 starts
 LEAST_GAIN = 0.04  # m/s^2 over WINDOW: waves that come and go within it leave less, a start of .4 m/s more
 NOISY_BIAS = 200.0  # sqrt(Hz): the same of a noisier one, in its noise ...
 LARGEST_BIAS = 1.0  # m/s^2: ... at the most

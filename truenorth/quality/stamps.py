@@ -23,6 +23,7 @@ from truenorth.aiding.source import Aiding
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import radii
 from truenorth.quality.slow_aids import FIXES, SPEEDS
+from truenorth.state.evidence import Evidence, note
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
 
@@ -35,7 +36,7 @@ SLOW = 1e-9  # m/s, m/s^2 or rad/s: rates that have no direction, and are looked
 ANYWHERE = np.array([1.0, 0.0, 0.0])
 SHORTEST = 1e-3  # s, of a step
 STEP = 0.5  # s, over which the motion of a vehicle is steady
-LATELY = 2.0 * STEP
+LATELY = 2.0 * STEP  # s: a velocity so old is that of another leg
 MOST = 25.0  # square of a normalised difference, that is an outlier beyond
 
 
@@ -60,6 +61,11 @@ def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float, looks: int
     likelihood = np.sum([likelihoods(*pair, TRIES) for pair in seen], axis=0)
     best = int(np.argmax(likelihood))
     return float(TRIES[best]) if likelihood[best] - likelihood[0] > limit("rival") + 4.0 * math.log(looks) else 0.0
+
+
+def stamp_notes(scatter: float) -> list[Evidence]:
+    """That a receiver's stamps scatter by so much, s, one sigma; nothing of none."""
+    return [note("noise.stamps", name="GNSS", size=scatter)] if scatter > 0.0 else []
 
 
 def scattered(aiding: Sequence[Aiding], track: Track, sigma: float) -> dict[str, Array]:
