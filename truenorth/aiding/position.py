@@ -32,7 +32,7 @@ from truenorth.state.now import NOW_C, NOW_EARTH, NOW_OTHER_RATE, NOW_RATE_NOISE
 from truenorth.strapdown.wander import azimuth, curvature, earth_axis
 
 _PHI, _DV, _DP, _BG = 0, 3, 6, 9
-_SHORT = 0.25  # s, of a delay: a quarter of the usual swing
+_SHORT = 0.5  # s, of a delay: a quarter of a swing of two seconds
 
 
 @compiled
