@@ -8,7 +8,7 @@ import pytest
 from truenorth.alignment import align
 from truenorth.core.position import Position
 from truenorth.errors.staying import QUIETEST_BASE, StaticModel
-from truenorth.errors.sway import with_motion
+from truenorth.errors.sway import about_rest, with_motion
 from truenorth.estimate.ongoing import CONTEXT
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import FilterState, kalman
@@ -43,9 +43,13 @@ def whole_log(end, record):
     taken = np.concatenate([np.zeros(6), end.bias, *([end.arm] if sways else [])])
     noise = StaticModel.of(SPEC)
     log = StayingLog(record, end.C_n0_i, PLACE, noise, prior, end.interval, sways=sways, form=end.form, taken=taken)
-    system = log.linearise()
     if sways:
-        return with_motion(system, end.interval, end.motion)
+        return with_motion(log.linearise(), end.interval, end.motion)
+    assert end.trend is not None
+    t = -1.0 + 2.0 * np.arange(len(log.integrals.C_mean)) / (end.fitted - 1)
+    basis = np.stack([np.ones_like(t), t], axis=1)
+    lines = (basis @ end.trend[0], basis @ end.trend[1])  # of the first part, over all rows
+    system = log._system(about_rest(log.integrals, lines, end.C_n0_i, PLACE.lat))
     return replace(system, R=system.R + np.diag(end.R - QUIETEST_BASE**2))
 
 

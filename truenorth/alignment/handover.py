@@ -17,7 +17,7 @@ from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION
 from truenorth.errors.staying import BIASES, STATES, StaticModel
-from truenorth.errors.sway import sway_trend
+from truenorth.errors.sway import rest_trend, sway_trend
 from truenorth.estimate.ongoing import Ongoing, block_limits
 from truenorth.navigation.handover import Handover
 from truenorth.strapdown.inertial import earth_rotation
@@ -46,6 +46,7 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
     """The filter's end, from which it goes on."""
     integrals = fine.integrals
     sways = isinstance(fine, SwayAlignment)
+    rest = None if sways else rest_trend(integrals, fine.C_n0_i, task.position.lat)
     # The arm of a sway of less than a minute is left behind: rows that follow show it as motion of the base.
     kept = np.arange(fine.system.states if sways else STATES)
     if isinstance(fine, SwayAlignment) and fine.slow_arm is not None:
@@ -60,7 +61,7 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         R=fine.disturbance**2,
         arm=fine.arm - fine.end[STATES : STATES + 3] if isinstance(fine, SwayAlignment) else None,
         motion=fine.motion if isinstance(fine, SwayAlignment) else (),
-        trend=(sway_trend(integrals.C_mean), sway_trend(integrals.C_late)) if sways else None,
+        trend=(sway_trend(integrals.C_mean), sway_trend(integrals.C_late)) if sways else rest,
         epochs=len(integrals.intervals),
         fitted=len(integrals.intervals),
         start=integrals.start,

@@ -18,7 +18,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
 from truenorth.errors.arm import arm_rows, with_arm
 from truenorth.errors.staying import BG, PHI, QUIETEST_BASE, STATES, Form, StaticModel
-from truenorth.errors.sway import AxisMotion, with_motion
+from truenorth.errors.sway import AxisMotion, about_rest, with_motion
 from truenorth.estimate.staying import core_system
 from truenorth.filters import Estimates, FilterState, LinearSystem, kalman
 from truenorth.records import ImuRecord
@@ -49,7 +49,9 @@ class Ongoing:
     R: Array  # (3,) (m/s)^2: variance of the base's own velocity, east, north, up
     arm: Array | None  # (3,) m: nominal lever arm, where it is a state
     motion: tuple[AxisMotion, ...]  # of the base, where it is a state; else empty
-    trend: tuple[Array, Array] | None  # (2, 9) each: of the attitude by which biases act on a base that sways
+    trend: (
+        tuple[Array, Array] | None
+    )  # (2, 9) each: of the attitude by which biases act; of a base that rests in the local frame
     epochs: int  # so far
     fitted: int  # epochs of the batch
     start: float  # s: when the inertial frame was frozen
@@ -158,8 +160,11 @@ class Ongoing:
         if self.trend is not None:
             t = -1.0 + 2.0 * (self.epochs + np.arange(len(integrals.C_mean))) / (self.fitted - 1)
             basis = np.stack([np.ones_like(t), t], axis=1)
-            C_mean, C_late = ((basis @ coefficients).reshape(-1, 3, 3) for coefficients in self.trend)
-            slow = replace(integrals, C_mean=C_mean, C_late=C_late)
+            mean, late = (basis @ coefficients for coefficients in self.trend)
+            if self.arm is None:  # of a base that rests
+                slow = about_rest(integrals, (mean, late), self.C_n0_i, place.lat)
+            else:
+                slow = replace(integrals, C_mean=mean.reshape(-1, 3, 3), C_late=late.reshape(-1, 3, 3))
         P0 = np.zeros((STATES, STATES))
         system = core_system(self.noise, slow, integrals, self.C_n0_i, place, P0, self.form)
         if self.arm is not None:

@@ -32,7 +32,7 @@ from truenorth.errors.staying import (
     force_system,
     measured_at_rest,
 )
-from truenorth.errors.sway import without_sway
+from truenorth.errors.sway import without_shaking, without_sway
 from truenorth.estimate.cells import cell_of, system_of_cell
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
@@ -232,9 +232,14 @@ class StayingLog:
             cell = cell_of(self.C_n0_i, self.integrals, self.position.lat)
             if cell is not None:
                 return self._of_cell(cell)
-        blind = "rate" in self.prior.groups  # gyros that do not see the earth turn know no slow turn about the vertical
-        slow = without_sway(self.integrals, self.C_sb, straight=blind) if self.sways else self.integrals
-        return self._system(slow)
+        if self.sways:
+            blind = (
+                "rate" in self.prior.groups
+            )  # gyros that do not see the earth turn know no slow turn about the vertical
+            return self._system(without_sway(self.integrals, self.C_sb, straight=blind))
+        if self.prior.groups:
+            return self._system(self.integrals)
+        return self._system(without_shaking(self.integrals, self.C_n0_i, self.position.lat))
 
     def _of_cell(self, cell: Array) -> LinearSystem:
         log, C, lat, alt = self.integrals, self.C_n0_i, self.position.lat, self.position.alt
