@@ -132,6 +132,7 @@ def correct(
         return SOUND
     kept.nis[number] = nis
     kept.verdict[number] = USED
+    smoothing = kept.Phi.shape[0] > 0
     if not nis <= sources.gates[source, count - 1]:
         kept.verdict[number] = REJECTED
         m.refused[source] += 1
@@ -145,10 +146,12 @@ def correct(
                 jump += w.z[a] * w.z[a]
         for a in range(sources.opens[source], sources.opens[source] + 3):
             w.P[a, a] += jump
+            if smoothing:
+                room.Q[a, a] += jump
     m.refused[source] = 0
-    smoothing = kept.Phi.shape[0] > 0
     if smoothing:
         for a in range(3):
+            kept.R[link, a] = w.R[a, a]
             for b in range(len(m.aux)):
                 kept.H[link, a, b] = w.H[a, b]
     loop = sources.loop[source]

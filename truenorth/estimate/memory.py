@@ -101,8 +101,8 @@ class Kept(NamedTuple):
     """Histories; an axis of length 0 keeps nothing.
 
     `time`, `state`, `aux`, `P` are those at each output; `when`, `innovation`, `sigma`, `nis`, `verdict` those of each
-    event, the re-timed ones behind the others; `Phi, Q, H, dx` lead from event to event, for the smoother, and `D` from the errors
-    before a correction to those left after it; `lever` (J, 2) is that at each output.
+    event, the re-timed ones behind the others; `Phi, Q, H, R, dx` lead from event to event, for the smoother, and `D` from the
+    errors before a correction to those left after it; `lever` (J, 2) is that at each output.
     """
 
     time: Array
@@ -117,6 +117,7 @@ class Kept(NamedTuple):
     Phi: Array
     Q: Array
     H: Array
+    R: Array
     dx: Array
     D: Array
     lever: Array

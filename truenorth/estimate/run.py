@@ -317,6 +317,7 @@ def _room(setting: Setting, plan: Rows, late: Rows, n: int) -> Kept:
         Phi=np.empty((links, n, n)),
         Q=np.empty((links, n, n)),
         H=np.zeros((links, 3, n)),
+        R=np.ones((links, 3)),
         dx=np.zeros((links, n)),
         D=np.tile(np.eye(n), (links, 1, 1)),
         lever=np.zeros((outputs, 2)),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from truenorth.errors import azimuth_free, invariant
 from truenorth.estimate.along_curve import knows_body, lever_now
 from truenorth.estimate.correct import feed_back
-from truenorth.estimate.memory import AS_IT_IS, USED, Events, Kept, Model
+from truenorth.estimate.memory import AS_IT_IS, REOPENED, USED, Events, Kept, Model
 from truenorth.filters import LinearSystem
 from truenorth.filters.smoother import smoother
 from truenorth.strapdown import wander
@@ -42,7 +42,7 @@ def smoothed(plan: Events, kept: Kept, P0: Array, model: Model) -> tuple[Array, 
     P : (J, n, n) array
     """
     linked = (plan.source >= 0) | plan.output
-    innovation, used = kept.innovation[linked], kept.verdict[linked] == USED
+    innovation, used = kept.innovation[linked], np.isin(kept.verdict[linked], (USED, REOPENED))
     count, n = len(innovation), len(P0)
     corrected = np.zeros((count, n))  # after each event, in the errors before it
     z = np.full((count, 3), np.nan)
@@ -57,7 +57,7 @@ def smoothed(plan: Events, kept: Kept, P0: Array, model: Model) -> tuple[Array, 
         x = x + kept.dx[k]
         corrected[k] = x
     R = np.zeros((count, 3, 3))
-    R[:, range(3), range(3)] = np.where(np.isfinite(z), plan.variance[linked], 1.0)
+    R[:, range(3), range(3)] = np.where(np.isfinite(z), kept.R, 1.0)
     answer = smoother(LinearSystem(Phi=Phi, Q=kept.Q, H=kept.H, R=R, z=z, x0=np.zeros(n), P0=P0))
     out = plan.output[linked]
     left, P, D = answer.x[out] - corrected[out], answer.P[out], kept.D[out]
