@@ -51,26 +51,38 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list
     wanders by its instability, which stands on the vertical for all to see: so small a step is part of that.
     """
     ratio, size, ends = match
-    instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
     accel = np.arange(len(ratio)) % 6 >= 3
-    ratio = np.where(accel & (np.abs(size) < limit("wanders") * instability), 0.0, ratio)
+    ratio = np.where(accel & (np.abs(size) < wander_of(spec)), 0.0, ratio)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
         return []
     left = np.where(ratio > limit("hint"), np.abs(ends[PHI] * size), 0.0)
     heading, level = float(left[2].max()), float(np.hypot(left[0], left[1]).max())
-    axis, sensor = best % 3, "gyro" if best % 6 < 3 else "accel"
+    return step_evidence(fine, best, float(ratio[best]), float(size[best]), heading, level)
+
+
+def step_evidence(
+    fine: FineAlignment, at: int, ratio: float, size: float, heading: float, level: float
+) -> list[Evidence]:
+    """That the bias of a signature changes, by its place among them, and by how much heading and level are off."""
+    sensor = "gyro" if at % 6 < 3 else "accel"
     figures: dict[str, Figure] = {
-        "axis": "xyz"[axis],
-        "onset": SIGNATURES[best // 6][1] * float(fine.integrals.time[-1]),
-        "size": abs(float(size[best])),
-        "ratio": float(ratio[best]),
+        "axis": "xyz"[at % 3],
+        "onset": SIGNATURES[at // 6][1] * float(fine.integrals.time[-1]),
+        "size": abs(size),
+        "ratio": ratio,
         "chance": limit("hint"),
         "heading": heading,
         "level": level,
     }
-    kind: Kind = "hint" if may_be_chance(float(ratio[best])) else "bounded"
+    kind: Kind = "hint" if may_be_chance(ratio) else "bounded"
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
+
+
+def wander_of(spec: ImuSpec) -> float:
+    """By how much an accelerometer's bias may change as its instability says, or as is usual, m/s^2."""
+    usually = usual("accel", "bias_instability", spec.accel_random_walk)
+    return limit("wanders") * max(spec.accel_bias_instability, usually)
 
 
 def bias_signatures(fine: FineAlignment, courses: Sequence[tuple[str, float]] = SIGNATURES) -> Signatures:

@@ -13,6 +13,7 @@ from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signa
 from truenorth.alignment.loud_rows import loud_rows_evidence
 from truenorth.alignment.masked import masked_evidence
 from truenorth.alignment.matched import innovations_of, matched
+from truenorth.alignment.steps_in_turn import steps_in_turn
 from truenorth.alignment.sway_noise import sway_noise_evidence
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.alignment.swing import swing_note
@@ -50,7 +51,8 @@ def what_begins(
     rival = float(max(drift.ratio.max(), bias.ratio.max()))
     if sways:
         drift, bias = weighed_by_colour(seen, banks[:2], (drift, bias))
-    steps = bias_step_evidence(fine, spec, bias)
+    in_turn = sways and not given
+    steps = steps_in_turn(fine, spec, bias, others) if in_turn else bias_step_evidence(fine, spec, bias)
     steps += masked_evidence(fine, spec)
     elsewhere = None
     if isinstance(fine, SwayAlignment):
