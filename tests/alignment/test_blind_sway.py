@@ -1,5 +1,7 @@
 """A ship whose IMU is too poor to see the earth turn, or of which nobody says how good it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,18 @@ def test_level_of_a_ship_by_gyros_that_do_not_see_the_earth_turn(imu: str, given
     answer = align(record, place, imu if given else None)
     assert answer.status == "level_only", answer.reasons
     assert np.max(np.abs(misses(answer, truth)["level"])) < 4.0
+
+
+@pytest.mark.parametrize("seed", some([4], [5, 6, 7]))
+def test_an_accelerometer_that_steps_is_said_and_counts(seed: int) -> None:
+    """By 30 mg after 100 s: level was 4.9 to 10.6 sigmas off, in silence. Sound logs show no step."""
+    record, place, truth = _ship("industrial", seed, 180.0)
+    step = np.array([0.0, 0.3, 0.0]) * (record.time > 100.0)[:, None] * record.interval
+    for fault in (False, True):
+        answer = align(replace(record, accel=record.accel + fault * step), place, "industrial")
+        assert any(item.key == "bias.accel_steps" for item in answer.evidence) == fault
+        if answer.status == "level_only":
+            assert np.max(np.abs(misses(answer, truth)["level"])) < 4.0
 
 
 @pytest.mark.parametrize("duration", some([150.0], [240.0]))

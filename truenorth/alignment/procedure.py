@@ -35,7 +35,7 @@ from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rivals import rival_evidence
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
-from truenorth.alignment.signatures import what_begins
+from truenorth.alignment.signatures import level_step_evidence, what_begins
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
 from truenorth.alignment.swung_bias import swung_biases
@@ -252,7 +252,8 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     )
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
     way = strays(fine, task.position, used.gyro_random_walk)
-    return _Found(answer, unchecked, fine.settled, way=way, moved=_moves_on(task, fine))
+    steps = level_step_evidence(fine, used)
+    return _Found(answer, unchecked, fine.settled, steps=steps, way=way, moved=_moves_on(task, fine))
 
 
 def _moves_on(task: Task, fine: FineAlignment) -> Array:

@@ -63,3 +63,13 @@ def what_begins(
             [*sway_noise_evidence(fine.noisier, spec, position.lat), *loud_rows_evidence(fine, spec)] if given else []
         )
     return detect_drift(fine, drift), steps, hemisphere_evidence(gravity, fine, position, elsewhere, given=given)
+
+
+def level_step_evidence(fine: FineAlignment, spec: ImuSpec) -> list[Evidence]:
+    """A step of an accelerometer's bias, of a log of which level alone is known: heading and its gyros' biases are not asked."""
+    seen, bank = innovations_of(fine), bias_signatures(fine)
+    (match,) = weighed_by_colour(seen, (bank,), matched(seen, bank))
+    left = match.left.copy()
+    left[2] = 0.0
+    accel = np.arange(len(match.ratio)) % 6 >= 3
+    return bias_step_evidence(fine, spec, match._replace(ratio=np.where(accel, match.ratio, 0.0), left=left))
