@@ -9,7 +9,14 @@ from benchmarks.honesty.foreign_rows import CASES
 from truenorth.aiding.aids import Odometer
 from truenorth.core.position import Position
 from truenorth.navigation import Start, navigate
-from truenorth.navigation.stops import DISTURBED_VELOCITY, STILL_VELOCITY, seconds_at_rest, updates_at, velocity_at_rest
+from truenorth.navigation.stops import (
+    DISTURBED_VELOCITY,
+    STILL_VELOCITY,
+    seconds_at_rest,
+    updates_at,
+    velocity_at_rest,
+    zero_updates,
+)
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
 from truenorth.records.specs import imu_spec
@@ -78,6 +85,35 @@ def test_a_vehicle_that_rolls_to_rest_is_not_taken_to_stand(standing, phase):
     found = seconds_at_rest(record, gnss=log)[0]
     assert np.count_nonzero(found > 100.0) > 180
     assert np.interp(found, time, speed).max() < STILL_VELOCITY
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("stands", [2.0, 4.0, 60.0])
+def test_soft_braking_at_the_end_of_a_stop_is_no_rest(standing, sign, stands):
+    """.06 m/s^2, below what tells motion from tilt, to rest or from it: seconds of .1 m/s were zero to .01; a slope is rest."""
+    time = standing.time
+    since = sign * (time - 150.0) + 0.5 * stands
+    at = np.array([-60.0, -52.0, -7.0, -3.0, 0.0])
+    knots = np.concatenate([at, stands - at[::-1]])
+    roll = np.interp(since, knots, [0.0, 8.0, 8.0, 0.18, 0.0, 0.0, 0.18, 8.0, 8.0, 0.0])
+    push = np.gradient(sign * roll, time)[:, None] * np.array([0.0, 1.0, 0.0]) + np.array([0.3, 0.1, 0.0])
+    scale = standing.interval if standing.kind == "increments" else 1.0
+    log = gnss(np.interp(T, time, roll)[:, None] * np.array([0.0, 1.0, 0.0]))
+    found = seconds_at_rest(replace(standing, accel=standing.accel + scale * push), gnss=log)[0]
+    assert np.interp(found, time, roll).max() < STILL_VELOCITY
+    inside = np.abs(found - 150.0) < 0.5 * stands
+    assert np.count_nonzero(inside) >= (stands - 6.0 if stands > 10.0 else 0.0)
+    assert np.count_nonzero(np.abs(found - 150.0) > 0.5 * stands + 60.0) > 100
+
+
+def test_a_second_is_compared_with_those_inside_its_stop(standing):
+    """A base that rests throughout keeps its ends; times that a user gives are left as they are."""
+    alone = seconds_at_rest(standing)[0]
+    assert alone[0] < 1.0
+    assert alone[-1] > standing.time[-1] - 1.5
+    assert len(alone) == len(np.unique(alone)) >= 298
+    given = zero_updates(standing, [(20.0, 22.0), (40.0, 41.0)])[0]
+    assert given.time.tolist() == [20.5, 21.5, 40.5]
 
 
 @pytest.mark.slow

@@ -53,6 +53,25 @@ def test_a_turn_is_as_far_off_as_its_sigma_says(kind, most):
     assert np.abs(off).max() < most
 
 
+@pytest.mark.parametrize("run", range(3))
+def test_rows_that_are_far_apart_say_nothing_of_axes(run):
+    """A vehicle that brakes and turns every 10 s: of rows 30 s apart half the way was "not the change of its positions"."""
+    rng, step = np.random.default_rng(run), 0.2
+    t = step * np.arange(4500)
+    edges = np.arange(-10.0, t[-1] + 20.0, 10.0)
+    v = [np.interp(t, edges, 6.0 * rng.standard_normal(len(edges))) for _ in range(2)]
+    v_n = np.stack([*v, 0.0 * t], axis=1)
+    way = np.vstack([np.zeros(3), np.cumsum(0.5 * step * (v_n[1:] + v_n[:-1]), axis=0)])
+    R_M, R_N = radii(0.7)
+    lat, lon = 0.7 + way[:, 1] / R_M, way[:, 0] / R_N / np.cos(0.7)
+    for every, exchanged in ((1.0, True), (2.0, True), (20.0, False), (30.0, False), (60.0, False)):
+        at = slice(None, None, round(every / step))
+        said = v_n[at] + 0.05 * rng.standard_normal((len(t[at]), 3))
+        assert turn_evidence("gnss", t[at], lat[at], lon[at], said) == [], every
+        found = turn_evidence("gnss", t[at], lat[at], lon[at], said[:, [1, 0, 2]])
+        assert [item.key for item in found] == ["gnss.velocity"] * exchanged, every
+
+
 def test_a_long_way_at_a_high_latitude_shows_no_turn():
     """50 km in S-turns at 62 deg: east there is .8 deg off where it was at the beginning, along a parallel as along a meridian."""
     t = 0.2 * np.arange(1200)

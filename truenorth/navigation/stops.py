@@ -36,6 +36,9 @@ CALM = 5.0  # times the acceleration of nearly all seconds at rest: a vehicle th
 DIFFERS = 6.0  # times the usual difference of rates of two seconds at rest, from which a rate is another
 MOST_VOTES = 300  # seconds that say what the usual rate is
 APART = 1.5  # s: seconds further apart are two rests
+EDGE = 3  # seconds at either end of a stop, in which a vehicle may still roll, or set off
+INSIDE = 10  # seconds, further in, with which they are compared
+FEWEST_SECONDS = 3  # of a stop: of fewer nothing says whether their force is tilt or braking
 SPREAD = 0.25  # s before and after the middle of a second at rest, between which its row is drawn
 
 
@@ -46,7 +49,8 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves. The second after one in
     which it moves does not count: a vehicle sets off with a push, but rolls to rest, and may have .1 m/s in it, ten times the
     sigma of rest, with less acceleration than tells motion from tilt. Nor does one in which it turns evenly on the spot: its
-    rate is not that of the other seconds, and no bias changes by so much.
+    rate is not that of the other seconds, and no bias changes by so much. Seconds at the ends of a stop count where their forces,
+    against those inside the stop, change no velocity beyond the sigma of rest.
 
     Returns
     -------
@@ -63,8 +67,37 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     if still.any():
         off = np.linalg.norm(motion.rate - np.median(motion.rate[still], axis=0), axis=1)
         still &= off < BIAS_CHANGE + 5.0 * float(np.linalg.norm(motion.angle_noise))
+    disturbed = before & (motion.kind == DISTURBED)
+    stands = _without_rolling_ends(still, disturbed, motion.specific_force)
     middle = motion.time - 0.5
-    return middle[still], middle[before & (motion.kind == DISTURBED)]
+    return middle[still & stands], middle[disturbed & stands]
+
+
+def _without_rolling_ends(still: NDArray[np.bool_], disturbed: NDArray[np.bool_], force: Array) -> NDArray[np.bool_]:
+    """(m,) seconds at rest but for those at the ends of stops in which the base may move faster than the sigma of rest.
+
+    Soft braking looks like tilt. Tilt and bias are those inside the stop; what the level force (m, 3) of a second is off from
+    there changes the velocity, and that of the seconds further in, too, since it is zero at last.
+    """
+    stands = still | disturbed
+    sigma = np.where(still, STILL_VELOCITY, DISTURBED_VELOCITY)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(np.int8)))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        count = end - first
+        if count < FEWEST_SECONDS:
+            stands[first:end] = False
+            continue
+        ends = min(EDGE, (count - 1) // 2)
+        for inwards in (np.arange(first, end), np.arange(first, end)[::-1]):
+            inside = np.median(force[inwards[ends : min(ends + INSIDE, count - ends)]], axis=0)
+            up = inside / max(float(np.linalg.norm(inside)), 1e-12)
+            outwards = inwards[:ends][::-1]
+            off = force[outwards] - inside
+            velocity = np.linalg.norm(
+                np.cumsum(off - np.outer(off @ up, up), axis=0), axis=1
+            )  # m/s: each lasts a second
+            stands[outwards[np.logical_or.accumulate(velocity > sigma[outwards])]] = False
+    return stands
 
 
 def turned_in_stops(

@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 PIECE = 20.0  # s, of a displacement
 LEAST_WAY = 20.0  # m of a piece: shorter ones do not show a direction
 FEWEST = 4  # pieces of such a way, that show wrong axes
+SURE = 3.0  # times what sums of velocities may err by: so much is left of them where their axes are wrong
 CELLS = 60  # of a log, at most: means over them are compared
 FEWEST_CELLS = 4  # without a gap between them
 RATIOS = (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0)  # of the walk's variance in a cell to that of the white noise
@@ -73,7 +74,8 @@ def turn_evidence(
 ) -> list[Evidence]:
     """By how much velocities are turned, where positions contradict them; heading would be as wrong.
 
-    Velocities of exchanged or flipped axes fit no turn at all: displacements over pieces say so.
+    Velocities of exchanged or flipped axes fit no turn at all: displacements over pieces say so, by more than sums of velocities
+    may err. Where rows are so far apart that these err by as much as the way, nothing is said.
 
     Parameters
     ----------
@@ -101,8 +103,13 @@ def turn_evidence(
     p, s = np.diff(at[edges])[good], np.diff(whole[edges])[good]
     if not len(p):
         return []
+    errs = float(np.sum(np.diff(_summed_error(velocity, steps, stretch)[edges])[good]))
+    way = float(np.sum(np.abs(p) ** 2))
+    if errs >= way:
+        return []
     k = np.sum(p * np.conj(s)) / np.sum(np.abs(s) ** 2)
-    if len(p) >= FEWEST and np.sum(np.abs(p - k * s) ** 2) > limit("turned as one") * np.sum(np.abs(p) ** 2):
+    left = float(np.sum(np.abs(p - k * s) ** 2))
+    if len(p) >= FEWEST and left > max(limit("turned as one") * way, SURE**2 * errs):
         return [contradiction(f"{source}.velocity", "sensor_axes")]
     cells = _cells(stretch, time, at, k * whole, velocity)
 
@@ -120,6 +127,17 @@ def turn_evidence(
         return []
     figures: dict[str, Figure] = {"angle": found.angle, "sigma": found.sigma}
     return [Evidence(f"{source}.turned", figures, "bounded", Effect(heading=abs(found.angle)), ("grid_north",))]
+
+
+def _summed_error(velocity: NDArray, steps: Array, stretch: NDArray[np.intp]) -> Array:
+    """(N,) variance of the sum of velocities up to each row, from what they may do between rows, m^2.
+
+    Velocities that have nothing to do with their neighbours differ by twice their variance, and the mean of two has half of it. Of
+    a vehicle that changes its velocity slowly this is too much: of a random walk three times.
+    """
+    changes = np.abs(np.diff(velocity)[np.diff(stretch) == 0]) ** 2
+    usual = float(np.mean(changes)) if len(changes) else 0.0
+    return np.append(0.0, np.cumsum(0.25 * usual * steps**2))
 
 
 def _between(values: Array) -> Array:
