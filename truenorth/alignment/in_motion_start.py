@@ -170,7 +170,8 @@ def _by_gnss(gnss: GnssRecord, antenna: Mounting, time: float, end: float) -> tu
 
 def _first_shown(gnss: GnssRecord, antenna: Mounting, time: float) -> float:
     """When, s, from a time on, a receiver first shows a velocity; the time itself where it is long after that, as at rest."""
-    first = max(time, float(velocities_shown(gnss, antenna)[0][0]))
+    shown = velocities_shown(gnss, antenna)[0]
+    first = max(time, float(shown[0])) if len(shown) else time
     return first if first - time <= CARRIED else time
 
 
