@@ -1,10 +1,12 @@
 """The state from which a pass over a log on the move begins."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import (
     BANK_LEVEL,
     GNSS_START,
@@ -21,7 +23,7 @@ from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate, simulate_sensor
 from truenorth.simulation.course import Leg, course
 from truenorth.simulation.gnss import GnssSpec
-from truenorth.state.layout import DV
+from truenorth.state.layout import DV, PHI
 from truenorth.state.mounting import Mounting
 
 SPEC = imu_spec("tactical")
@@ -80,3 +82,58 @@ def test_noise_of_a_receiver_tilts_no_bank():
         for guess in guesses_all_round(record, None, gnss, Mounting(), Mounting(latency_sigma=0.2)):
             assert guess.C_nb[2, 2] == pytest.approx(1.0, abs=1e-6)
             assert guess.level_sigma == BANK_LEVEL
+
+
+@pytest.mark.parametrize("shows", ["places", "velocities"])
+@pytest.mark.parametrize("apart", [0.1, 1.0])
+def test_an_aircraft_that_turns_begins_with_the_velocity_of_its_first_moment(shows, apart):
+    """Not with that of half a second or a second later, which is what fixes show first: 4.6 m/s^2 at 25 deg of bank."""
+    speed, bank = 50.0, math.radians(25.0)
+    rate = 9.8 * math.tan(bank) / speed
+    motion = course(
+        Position(0.8, 0.1, 500.0), [Leg(62.0, turn=60.0 * rate, bank="coordinated")], heading=1.0, speed=speed
+    )
+    sim = simulate(motion, rate=100.0, duration=40.0, imu="tactical", seed=1)
+    receiver = GnssSpec(rate=1.0 / apart, position_noise=0.02, velocity_noise=0.05)
+    gnss = simulate_sensor(motion, receiver, duration=40.0, seed=1).record.between(10.5, None)
+    if shows == "places":
+        gnss = replace(gnss, v_n=None, velocity_sigma=None)
+    record = sim.record.between(10.0, None)
+    begin = int(np.searchsorted(sim.truth.time, record.time[0] - record.steps[0] - 1e-6))
+    guess = Guess(sim.truth.C_nb[begin], math.radians(0.5), math.radians(3.0))
+    antenna = Mounting(latency_sigma=0.2)
+    start = start_at(record, guess, Position(0.8, 0.1, 500.0), SPEC, None, gnss, Mounting(), antenna)
+    sigma = np.sqrt(np.diag(start.P)[DV])
+    assert np.all(np.abs(start.v_n - sim.truth.v_n[begin]) < 0.5)
+    assert np.all(sigma < 1.5)
+
+
+def test_a_receiver_that_comes_late_to_a_vehicle_at_rest_shows_its_velocity():
+    """A minute by the IMU alone would make it unsure by tens of m/s, and it rests."""
+    place = Position(0.8, 0.1, 500.0)
+    record = simulate(rest(place, 0.3), rate=50.0, duration=80.0, imu="navigation", seed=1).record
+    receiver = GnssSpec(rate=5.0, position_noise=1.0, velocity_noise=0.1)
+    gnss = simulate_sensor(rest(place, 0.3), receiver, duration=80.0, seed=1).record.between(60.0, None)
+    start = start_at(record, Guess(np.eye(3), 0.01, 0.1), place, SPEC, None, gnss, Mounting(), Mounting())
+    assert np.all(np.sqrt(np.diag(start.P)[DV]) < 1.0)
+
+
+@pytest.mark.parametrize(("imu", "seed", "rate", "late"), [("navigation", 2, 1.0, 0.0), ("tactical", 1, 10.0, -0.4)])
+def test_an_aircraft_that_turns_is_aligned_by_fixes_of_centimetres_alone(imu, seed, rate, late):
+    """With the velocity of half a second later nine fixes of ten were refused; and so with .4 s taken along the tangent."""
+    speed = 40.0 + 10.0 * seed
+    turn = 20.0 * 9.8 * math.tan(math.radians(25.0)) / speed * (-1.0) ** seed
+    legs = [Leg(20.0, turn=way * turn, bank="coordinated") for way in (1.0, -1.0, 1.0)]
+    motion = course(Position(0.8, 0.1, 500.0), legs, heading=float(seed), speed=speed)
+    sim = simulate(motion, rate=100.0, duration=60.0, imu=imu, seed=seed)
+    receiver = GnssSpec(rate=rate, position_noise=0.02, velocity_noise=0.05)
+    gnss = simulate_sensor(motion, receiver, duration=60.0, seed=seed).record.shifted(late).between(8.5, None)
+    gnss = replace(gnss, v_n=None, velocity_sigma=None)
+    answer = align_in_motion(sim.record.between(8.0, None), imu, gnss=gnss, antenna=Mounting(latency_sigma=0.2))
+    moving = answer.moving
+    assert answer.status == "aligned"
+    off = misalignment(answer.C_nb, sim.truth.C_nb[-1]) / moving.track.sigma[-1, PHI]
+    assert np.all(np.abs(off) < 3.5)
+    delay, sigma = moving.delays["GNSS"]
+    assert abs(delay - late) < 3.5 * sigma
+    assert sigma < 0.01

@@ -40,7 +40,7 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     r = with_state(figures, ARM, assumed, at[AT_ARM])
     C, away, nothing = matrix_of(now, NOW_C), (-r[0], -r[1], -r[2]), (0.0, 0.0, 0.0)
     lag = lag_now(now, assumed, at[AT_LAG])
-    position_row(now, C, nothing, nothing, away, lag, nothing, -1, at[AT_LAG], -1, measured, H, z)
+    position_row(now, C, nothing, nothing, nothing, away, lag, nothing, -1, at[AT_LAG], -1, measured, H, z)
     still, w = times_back(C, vector_of(now, NOW_EARTH)), vector_of(now, NOW_RATE)
     swing = times(C, cross((w[0] - still[0], w[1] - still[1], w[2] - still[2]), away))
     s, c = now[NOW_NORTH], now[NOW_NORTH + 1]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.sensors import place_sigma
 from truenorth.alignment.task import level_of
-from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
+from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment, velocities_shown
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, rotation_vector_from_dcm, skew
 from truenorth.core.earth import radii
 from truenorth.core.position import Position
@@ -36,6 +36,7 @@ WIDER_LEVEL, NARROWED, LEAST_HEADING = 10.0, 0.3, math.radians(3.0)
 HEADINGS = 12  # of the bank, all round
 LEVEL_TIME = 4.0  # s
 NEAR = 2.0  # s, within which a row of the wheel shows the velocity
+CARRIED = 5.0  # s, over which the IMU leads a receiver's first velocity back to the start
 PUSH = 2.0  # m/s^2, one sigma of what a vehicle does before the wheel's first row
 ODOMETER_START, GNSS_START, UNKNOWN_START = 0.3, 0.3, 5.0  # m/s, one sigma of the velocity at the start
 
@@ -140,8 +141,10 @@ def start_at(
         askew = wheel.angle_sigma * float(np.linalg.norm(v_b))
         v_n, sigma = guess.C_nb @ v_b, math.hypot(ODOMETER_START, askew, since)
     elif gnss is not None:
-        v_n, sigma = _by_gnss(gnss, antenna, time, float(record.time[-1]))
-        sigma = math.hypot(sigma, _swing(record, antenna))
+        first = _first_shown(gnss, antenna, time)
+        v_n, sigma = _by_gnss(gnss, antenna, first, float(record.time[-1]))
+        gained, unsure = _gained(record, guess, first)
+        v_n, sigma = v_n - gained, math.hypot(sigma, unsure, _swing(record, antenna))
     # Slow parts of the biases are states of their own.
     angles = guess.level_sigma, guess.level_sigma, guess.heading_sigma
     variance = spec.constant_variance if guess.bias_variance is None else guess.bias_variance
@@ -163,6 +166,31 @@ def _by_gnss(gnss: GnssRecord, antenna: Mounting, time: float, end: float) -> tu
     if not gnss.has_velocity.any() and len(fixes) > 1:
         by_places = math.sqrt(2.0) * place_sigma(gnss) / float(np.median(np.diff(fixes)))
     return v[0], math.sqrt(GNSS_START**2 + by_places**2 + change**2)
+
+
+def _first_shown(gnss: GnssRecord, antenna: Mounting, time: float) -> float:
+    """When, s, from a time on, a receiver first shows a velocity; the time itself where it is long after that, as at rest."""
+    shown = velocities_shown(gnss, antenna)[0]
+    first = max(time, float(shown[0])) if len(shown) else time
+    return first if first - time <= CARRIED else time
+
+
+def _gained(record: ImuRecord, guess: Guess, until: float) -> tuple[Array, float]:
+    """Velocity (3,), m/s, that a vehicle gains from its first sample to a time, by the IMU in the guessed attitude; one sigma.
+
+    Fixes show the velocity halfway between two. An aircraft that banks by 25 deg turns by 4.6 m/s^2 until then, and of fixes of
+    centimetres a start that is off by ten of its sigmas passes for a delay of .8 s.
+    """
+    begin = float(record.time[0] - record.steps[0])
+    rows = int(np.searchsorted(record.time, until - 0.5 * record.interval))
+    if rows == 0 or until <= begin:
+        return np.zeros(3), 0.0
+    dtheta, dvel = increments(record)
+    felt = inertial_integrals(dtheta[:rows], dvel[:rows], record.steps[:rows], [0, rows])[1][1]
+    fallen = STANDARD_GRAVITY * float(record.steps[:rows].sum())
+    gained = guess.C_nb @ felt - np.array([0.0, 0.0, fallen])
+    turned = min(guess.heading_sigma, 1.0) * math.hypot(gained[0], gained[1])
+    return gained, math.hypot(turned, guess.level_sigma * fallen)
 
 
 def _swing(record: ImuRecord, antenna: Mounting) -> float:

@@ -145,23 +145,32 @@ def gnss_track(gnss: GnssRecord, at: Array, mounting: Mounting | None = None) ->
         )
     height = np.where(np.isfinite(gnss.alt), gnss.alt, 0.0)
     place = np.stack([np.interp(at, time[fixed], a[fixed]) for a in (gnss.lat, gnss.lon, height)], axis=1)
-    known = gnss.has_velocity
-    if gnss.v_n is not None and known.sum() >= LEAST_FIXES:
-        v, when = np.nan_to_num(gnss.v_n[known]) / (1.0 - mounting.clock.rate), time[known]
-    else:
-        t, lat, lon, alt = time[fixed], gnss.lat[fixed], gnss.lon[fixed], height[fixed]
-        R_M, R_N = radii(lat[:-1])
-        T = np.diff(t)
-        v = np.stack(
-            [
-                np.diff(lon) * (R_N + alt[:-1]) * np.cos(lat[:-1]) / T,
-                np.diff(lat) * (R_M + alt[:-1]) / T,
-                np.diff(alt) / T,
-            ],
-            axis=1,
-        )
-        when = 0.5 * (t[1:] + t[:-1])
+    when, v = velocities_shown(gnss, mounting)
     return np.stack([np.interp(at, when, v[:, i]) for i in range(3)], axis=1), place
+
+
+def velocities_shown(gnss: GnssRecord, mounting: Mounting) -> tuple[Array, Array]:
+    """Times (M,), s, and velocities (M, 3), m/s, of an antenna: its own, or those by which its places differ, halfway between.
+
+    By the IMU's clock, as late as the antenna's mounting says, and in its seconds.
+    """
+    time = gnss.time - mounting.late_at(gnss.time)
+    known, fixed = gnss.has_velocity, gnss.has_position
+    if gnss.v_n is not None and known.sum() >= LEAST_FIXES:
+        return time[known], np.nan_to_num(gnss.v_n[known]) / (1.0 - mounting.clock.rate)
+    height = np.where(np.isfinite(gnss.alt), gnss.alt, 0.0)
+    t, lat, lon, alt = time[fixed], gnss.lat[fixed], gnss.lon[fixed], height[fixed]
+    R_M, R_N = radii(lat[:-1])
+    T = np.diff(t)
+    v = np.stack(
+        [
+            np.diff(lon) * (R_N + alt[:-1]) * np.cos(lat[:-1]) / T,
+            np.diff(lat) * (R_M + alt[:-1]) / T,
+            np.diff(alt) / T,
+        ],
+        axis=1,
+    )
+    return 0.5 * (t[1:] + t[:-1]), v
 
 
 def frames(time: Array, place: Array) -> Array:
