@@ -8,13 +8,14 @@ import pytest
 
 from benchmarks.honesty.circling import drawn_start, received
 from benchmarks.honesty.driving import STRAIGHT, car, ship
+from tests.runs import some
 from truenorth.alignment.in_motion_passes import turn_between
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track
-from truenorth.navigation import navigate
-from truenorth.navigation.by_start import UP
-from truenorth.navigation.recentred import WIDER, recentred
+from truenorth.navigation import Mounting, navigate
+from truenorth.navigation.by_start import LINEAR, UP
+from truenorth.navigation.recentred import WIDER, linear_within, recentred
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import ideal_log, simulate
 from truenorth.state.track import Track
@@ -103,3 +104,35 @@ def test_a_fix_that_jumps_turns_no_start(run):
     assert answer.status == "navigated"
     off = answer.track.errors_against(Track.along(motion.states(answer.time))) / answer.track.sigma[:, :9]
     assert np.abs(off[-1, :3]).max() < 4.0
+
+
+def with_fixes_of(aid, sigma, mounting):
+    """The receiver with fixes that it says to be so good, m."""
+    record = replace(aid.record, position_sigma=np.full((len(aid.record), 3), sigma))
+    return {"gnss": replace(aid, record=record, mounting=mounting)}
+
+
+def test_an_arm_that_is_not_known_makes_a_turn_of_the_heading_bent():
+    """By the turn times what the arm is uncertain by, against what a fix is good to."""
+    aid = sailed(1)[4]
+    assert linear_within({}) == LINEAR
+    assert linear_within(with_fixes_of(aid, 0.02, aid.mounting)) == LINEAR
+    assert linear_within(with_fixes_of(aid, 0.02, Mounting(lever_arm_sigma=4.0))) == pytest.approx(0.005)
+    assert linear_within(with_fixes_of(aid, 0.02, None)) == pytest.approx(0.004)
+    assert linear_within(with_fixes_of(aid, 2.0, None)) == LINEAR
+
+
+@pytest.mark.parametrize("seed", some([2], [0, 1, 3, 4, 5]))
+def test_fixes_of_centimetres_on_an_arm_that_is_not_said(seed):
+    """Heading is known to 5 deg at the start: four of these six cars were refused, heading 16 to 49 sigmas off."""
+    rng, spec = np.random.default_rng([seed, 7]), imu_spec("tactical")
+    motion = car(rng, DURATION)
+    record = simulate(ideal_log(motion, rate=25.0, duration=DURATION), imu=spec, seed=seed).record
+    begun = drawn_start(motion, spec, rng)
+    aid = with_fixes_of(received(motion, DURATION, 1.0, rng, place=0.02), 0.02, None)["gnss"]
+    start = turned(begun, math.radians(5.0) * rng.standard_normal(), math.radians(5.0))
+    result = navigate(record, start, aid=aid, imu=spec)
+    assert result.status == "navigated", result.reasons
+    truth = motion.states(result.time)
+    off = [turn_between(C, true) for C, true in zip(result.C_nb[5:], truth.C_nb[5:], strict=True)]
+    assert np.abs(np.array(off) / result.track.sigma[5:, UP]).max() < 4.0

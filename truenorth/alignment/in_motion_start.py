@@ -164,7 +164,9 @@ def _by_gnss(gnss: GnssRecord, antenna: Mounting, time: float, end: float) -> tu
     fixes = gnss.time[gnss.has_position]
     by_places = 0.0
     if not gnss.has_velocity.any() and len(fixes) > 1:
-        by_places = math.sqrt(2.0) * place_sigma(gnss) / float(np.median(np.diff(fixes)))
+        first = min(int(np.searchsorted(fixes[1:], time)), len(fixes) - 2)  # of the two fixes that show it
+        two = gnss.between(fixes[first], fixes[first + 1])
+        by_places = math.sqrt(2.0) * place_sigma(two) / float(np.median(np.diff(fixes)))
     return v[0], math.sqrt(GNSS_START**2 + by_places**2 + change**2)
 
 

@@ -50,7 +50,7 @@ from truenorth.navigation.given import (
 from truenorth.navigation.gyro_moment import gyros_of_another_moment
 from truenorth.navigation.passes import COARSE, filtered, quick_swing
 from truenorth.navigation.plan import Plan
-from truenorth.navigation.recentred import recentred
+from truenorth.navigation.recentred import linear_within, recentred
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, second_look
 from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
@@ -270,7 +270,7 @@ def _about_its_heading(plan: Plan, given: Mapping[str, Aid]) -> Plan:
     """The plan from the heading that the log shows, where its start was unsure (:mod:`truenorth.navigation.recentred`)."""
     aiding = {True: plan.sources(given), False: plan.sources(ungated(given))}
     run = lambda at, gated: replace(plan, start=at).run(aiding[gated], smooth=not gated)  # noqa: E731
-    return replace(plan, start=recentred(run, plan.start)) if aiding[True] else plan
+    return replace(plan, start=recentred(run, plan.start, linear_within(given))) if aiding[True] else plan
 
 
 def _damped(

@@ -15,11 +15,13 @@ as in passes on the move (:mod:`truenorth.alignment.in_motion_passes`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from truenorth.aiding.aids import Aid, Gnss
+from truenorth.aiding.sensors import place_sigma
 from truenorth.alignment.in_motion_passes import SETTLED, turn_between
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError
@@ -32,7 +34,19 @@ MOST = 3  # passes
 WIDER = 3.0  # times what the log leaves of a heading
 
 
-def recentred(run: Callable[[Start, bool], Track], start: Start) -> Start:
+def linear_within(given: Mapping[str, Aid]) -> float:
+    """Heading, rad, within which errors are linear: a turn of an arm that is not known moves an antenna by their product.
+
+    Of .1 rad and 5 m that is half a metre, which fixes of centimetres take for knowledge of the heading: it was 55 sigmas off.
+    """
+    receiver = given.get(Gnss.key)
+    if not isinstance(receiver, Gnss) or not receiver.record.has_position.any():
+        return LINEAR
+    arm = (receiver.mounting or receiver.usual).lever_arm_sigma
+    return min(LINEAR, place_sigma(receiver.record) / arm) if arm > 0.0 else LINEAR
+
+
+def recentred(run: Callable[[Start, bool], Track], start: Start, linear: float = LINEAR) -> Start:
     """The start with the heading that the log shows, where it was unsure and is shown; else the same one.
 
     Parameters
@@ -40,9 +54,11 @@ def recentred(run: Callable[[Start, bool], Track], start: Start) -> Start:
     run : callable
         The log from a start, with gates or, to be smoothed once that is asked for, without.
     start : Start
+    linear : float, rad
+        Sigma of heading within which nothing is asked.
     """
     before = math.sqrt(float(start.P[UP, UP]))
-    if before < LINEAR:
+    if before < linear:
         return start
     best, at, shown = math.inf, start, start
     for _ in range(MOST):
