@@ -46,7 +46,7 @@ def whole_log(end, record):
     if sways:
         return with_motion(log.linearise(), end.interval, end.motion)
     assert end.trend is not None
-    t = -1.0 + 2.0 * np.arange(len(log.integrals.C_mean)) / (end.fitted - 1)
+    t = np.minimum(-1.0 + 2.0 * np.arange(len(log.integrals.C_mean)) / (end.fitted - 1), 1.0)
     basis = np.stack([np.ones_like(t), t], axis=1)
     lines = (basis @ end.trend[0], basis @ end.trend[1])  # of the first part, over all rows
     system = log._system(about_rest(log.integrals, lines, end.C_n0_i, PLACE.lat))
@@ -70,6 +70,18 @@ def test_it_is_the_filter_of_the_whole_log_about_the_same_nominal_solution(recor
     x, sigma = found.x[-1], np.sqrt(np.diag(found.P[-1]))
     assert np.max(np.abs(went_on.x - x)[:12] / sigma[:12]) < tolerance
     np.testing.assert_allclose(np.diag(went_on.P)[:12], sigma[:12] ** 2, rtol=tolerance)
+
+
+def test_a_tilt_within_the_log_goes_no_further(record):
+    """Its line would: biases would act by an attitude that is degrees off an hour later, and level seem known by that."""
+    end = align(record.between(None, FIRST), PLACE, "navigation").ongoing
+    tilt = np.zeros((2, 9))
+    tilt[1, 5] = 0.01
+    tilted = tuple(line + tilt for line in end.trend)
+    stays = tuple(np.stack([line.sum(axis=0), np.zeros(9)]) for line in tilted)
+    one, two = (after(replace(end, trend=trend), record) for trend in (tilted, stays))
+    np.testing.assert_allclose(one.x, two.x, rtol=0, atol=1e-9 * np.sqrt(np.diag(two.P)).max())
+    np.testing.assert_allclose(one.P, two.P, rtol=1e-9, atol=1e-12 * np.abs(two.P).max())
 
 
 def test_chunks_give_the_same(record):

@@ -33,6 +33,25 @@ def log(rng, kind, turn=0.0, late=0):
     return t[at], 0.7 + p.imag / R_M, p.real / R_N / np.cos(0.7), np.stack([v.real, v.imag, 0.0 * v.real], axis=1)
 
 
+@pytest.mark.parametrize("there", [5, 20, 40, 50, 100])
+def test_a_receiver_with_many_gaps_shows_no_turn(there):
+    """So many fixes, then ten missing, over again: where no stretch is long enough for its cells, nothing is asked (it raised)."""
+    t = np.arange(3000.0)
+    t = t[t % (there + 10) < there]
+    v = 10.0 * np.exp(0.02j * t) + 3.0 * np.exp(0.3j * t)
+    p = -500.0j * np.exp(0.02j * t) - 10.0j * np.exp(0.3j * t)
+    R_M, R_N = radii(0.7)
+    lat, lon = 0.7 + p.imag / R_M, p.real / R_N / np.cos(0.7)
+    assert not turn_evidence("gnss", t, lat, lon, np.stack([v.real, v.imag, 0.0 * t], axis=1))
+
+
+def test_a_few_wrong_velocities_hide_no_exchanged_axes():
+    time, lat, lon, velocity = log(np.random.default_rng(4), "drive")
+    velocity[[20, 45]] = 600.0
+    (found,) = turn_evidence("gnss", time, lat, lon, velocity[:, [1, 0, 2]])
+    assert found.key == "gnss.velocity"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["drive", "wandering", "circles"])
 def test_a_sound_log_shows_no_turn(kind):

@@ -10,6 +10,7 @@ Source: Y. C. Pati, R. Rezaiifar and P. S. Krishnaprasad, Orthogonal matching pu
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import Match, innovations_of, matched
 from truenorth.errors.staying import PHI
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import Evidence
+from truenorth.state.evidence import Effect, Evidence
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -31,16 +32,23 @@ FREE = 3.0  # times its size, one sigma with which a change that was found expla
 
 
 class Change(NamedTuple):
-    """A bias that changes: place among the signatures, twice the log-likelihood ratio, size, and what it leaves (3,), rad."""
+    """A bias that changes: place among the signatures, twice the log-likelihood ratio, and size.
+
+    `left` (3,), rad, is what it leaves; `likely` what the level accelerometers leave besides, if they change as the vertical one
+    does: a sway hides theirs, and they are of the same maker, at the same temperature.
+    """
 
     at: int
     ratio: float
     size: float
     left: Array
+    likely: Array
 
 
 def steps_in_turn(fine: FineAlignment, spec: ImuSpec, match: Match, others: Array | None) -> list[Evidence]:
     """Evidence of the steps and ramps of biases that are there together, with the error that they leave.
+
+    Where the vertical one alone is seen to change, what level ones may do as well is in sigma, and refuses no log.
 
     Parameters
     ----------
@@ -55,9 +63,16 @@ def steps_in_turn(fine: FineAlignment, spec: ImuSpec, match: Match, others: Arra
     found = [change for change in changes(fine, spec, match, others) if not _wanders(change, spec)]
     if not found:
         return []
-    heading, level = float(_all([c.left[2] for c in found])), float(_all([np.hypot(*c.left[:2]) for c in found]))
+    left = _all([change.left for change in found])
     worst = max(found, key=lambda change: change.ratio)
-    return step_evidence(fine, worst.at, worst.ratio, worst.size, heading, level)
+    (said,) = step_evidence(
+        fine, worst.at, worst.ratio, worst.size, heading=float(left[2]), level=float(np.hypot(*left[:2]))
+    )
+    if not all(change.likely.any() for change in found):  # level ones that change are found themselves
+        return [said]
+    whole = _all([left, *(change.likely for change in found)])
+    effect = Effect(heading=float(whole[2]), level=float(np.hypot(*whole[:2])))
+    return [replace(said, effect=effect, kind="hint")]
 
 
 def changes(fine: FineAlignment, spec: ImuSpec, match: Match, others: Array | None) -> list[Change]:
@@ -66,15 +81,11 @@ def changes(fine: FineAlignment, spec: ImuSpec, match: Match, others: Array | No
     bank = bias_signatures(fine)
     vertical = 3 + int(np.argmax(np.abs((fine.C_n0_i @ fine.integrals.C_ib[-1])[2])))
     while len(found) < MOST and match.ratio.max() > limit("hint"):
-        ratio, size, left = match
+        ratio, size, ends = match
         at = _most_plausible(ratio, size, spec)
-        ends = np.abs(left[PHI, at] * size[at])
-        if (
-            at % 6 == vertical
-        ):  # the level ones, whose changes a sway hides, are of the same maker, at the same temperature
-            level = [at - at % 6 + axis for axis in range(3, 6) if axis != vertical]
-            ends = _all([ends, *np.abs(left[PHI][:, level] * size[at]).T])
-        found.append(Change(at, float(ratio[at]), float(size[at]), ends))
+        level = [at - at % 6 + axis for axis in range(3, 6) if axis != vertical] if at % 6 == vertical else []
+        likely = _all([np.zeros(3), *(ends[PHI, k] * size[at] for k in level)])
+        found.append(Change(at, float(ratio[at]), float(size[at]), np.abs(ends[PHI, at] * size[at]), likely))
         seen = seen_of(fine, FREE * size[at] * _course(at, len(fine.estimates.innovation)))
         others = seen if others is None else np.concatenate([others, seen], axis=2)
         innovations = innovations_of(fine, others)

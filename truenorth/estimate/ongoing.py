@@ -49,9 +49,8 @@ class Ongoing:
     R: Array  # (3,) (m/s)^2: variance of the base's own velocity, east, north, up
     arm: Array | None  # (3,) m: nominal lever arm, where it is a state
     motion: tuple[AxisMotion, ...]  # of the base, where it is a state; else empty
-    trend: (
-        tuple[Array, Array] | None
-    )  # (2, 9) each: of the attitude by which biases act; of a base that rests in the local frame
+    # (2, 9) each: of the attitude by which biases act; of a base that rests in the local frame
+    trend: tuple[Array, Array] | None
     epochs: int  # so far
     fitted: int  # epochs of the batch
     start: float  # s: when the inertial frame was frozen
@@ -159,6 +158,10 @@ class Ongoing:
         place, slow = self.position, integrals
         if self.trend is not None:
             t = -1.0 + 2.0 * (self.epochs + np.arange(len(integrals.C_mean))) / (self.fitted - 1)
+            if (
+                self.arm is None
+            ):  # a base that rests stays as it was at the end: a step of its tilt makes a line that goes on
+                t = np.minimum(t, 1.0)
             basis = np.stack([np.ones_like(t), t], axis=1)
             mean, late = (basis @ coefficients for coefficients in self.trend)
             if self.arm is None:  # of a base that rests

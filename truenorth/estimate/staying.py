@@ -233,9 +233,8 @@ class StayingLog:
             if cell is not None:
                 return self._of_cell(cell)
         if self.sways:
-            blind = (
-                "rate" in self.prior.groups
-            )  # gyros that do not see the earth turn know no slow turn about the vertical
+            # Gyros that do not see the earth turn know no slow turn about the vertical.
+            blind = "rate" in self.prior.groups
             return self._system(without_sway(self.integrals, self.C_sb, straight=blind))
         if self.prior.groups:
             return self._system(self.integrals)

@@ -93,9 +93,8 @@ def _without_rolling_ends(still: NDArray[np.bool_], disturbed: NDArray[np.bool_]
             up = inside / max(float(np.linalg.norm(inside)), 1e-12)
             outwards = inwards[:ends][::-1]
             off = force[outwards] - inside
-            velocity = np.linalg.norm(
-                np.cumsum(off - np.outer(off @ up, up), axis=0), axis=1
-            )  # m/s: each lasts a second
+            # m/s: each lasts a second
+            velocity = np.linalg.norm(np.cumsum(off - np.outer(off @ up, up), axis=0), axis=1)
             stands[outwards[np.logical_or.accumulate(velocity > sigma[outwards])]] = False
     return stands
 

@@ -35,6 +35,7 @@ LEAST_WAY = 20.0  # m of a piece: shorter ones do not show a direction
 FEWEST = 4  # pieces of such a way, that show wrong axes
 SURE = 3.0  # times what sums of velocities may err by: so much is left of them where their axes are wrong
 CELLS = 60  # of a log, at most: means over them are compared
+WRONG = 0.02  # of the rows, at the most, that are jumps of a receiver
 FEWEST_CELLS = 4  # without a gap between them
 RATIOS = (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0)  # of the walk's variance in a cell to that of the white noise
 LASTING = (
@@ -133,9 +134,11 @@ def _summed_error(velocity: NDArray, steps: Array, stretch: NDArray[np.intp]) ->
     """(N,) variance of the sum of velocities up to each row, from what they may do between rows, m^2.
 
     Velocities that have nothing to do with their neighbours differ by twice their variance, and the mean of two has half of it. Of
-    a vehicle that changes its velocity slowly this is too much: of a random walk three times.
+    a vehicle that changes its velocity slowly this is too much: of a random walk three times. Rows that are wrong are few, and make
+    the largest changes.
     """
-    changes = np.abs(np.diff(velocity)[np.diff(stretch) == 0]) ** 2
+    changes = np.sort(np.abs(np.diff(velocity)[np.diff(stretch) == 0]) ** 2)
+    changes = changes[: len(changes) - math.ceil(WRONG * len(changes))]
     usual = float(np.mean(changes)) if len(changes) else 0.0
     return np.append(0.0, np.cumsum(0.25 * usual * steps**2))
 
@@ -189,6 +192,8 @@ def _turn(
 ) -> Turn | None:
     """The turn of cells (M,), `whole` turned back about so far; None where they are too few."""
     count = len(time)
+    if count < FEWEST_CELLS:
+        return None
     own = stretch[:, None] == np.unique(stretch)  # a place of its own for each stretch
     columns = [whole, 1j * whole, velocity, *own.T.astype(complex), *(1j * own.T)]
     since = time - time[0]
