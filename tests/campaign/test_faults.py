@@ -100,9 +100,9 @@ def test_tilt_finds_which_order_sign_and_delay(procedure):
     faults = {fault.name: fault for fault in FAULTS}
     C_sb = None
     if procedure == "rotary":
-        from truenorth.alignment.rotary import _reading
+        from truenorth.alignment.encoder_angles import reading
 
-        C_sb = _reading(inputs["encoder"], ("z", "x"), np.eye(2))
+        C_sb = reading(inputs["encoder"], ("z", "x"), np.eye(2))
     sound = check_tilt(record, C_sb)
     assert sound is not None
     assert sound.evidence() == []
@@ -125,9 +125,9 @@ def test_a_base_that_does_not_turn_says_nothing_of_its_gyros():
 
 def test_an_indexer_whose_angles_are_right_is_believed():
     inputs, _ = BENCHES["rotary"].draw(SEED, 1)
-    from truenorth.alignment.rotary import _orders, _reading
+    from truenorth.alignment.encoder_angles import orders, reading
 
-    readings = {name: _reading(inputs["encoder"], ("z", "x"), order) for name, order in _orders(2).items()}
+    readings = {name: reading(inputs["encoder"], ("z", "x"), order) for name, order in orders(2).items()}
     given = readings.pop("given")
     assert encoder_evidence(inputs["record"], given, readings) == []
     wrong = readings.pop("exchanged")

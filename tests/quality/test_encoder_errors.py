@@ -42,7 +42,9 @@ def made(
     turn -= sum(u * e[:, None] for u, e in zip(directions, off(time, angles).T, strict=True))
     there = np.ones(len(time), dtype=bool)
     bias = np.cumsum(C, axis=0) * 0.1
-    return Turns(time, turn, there, angles, C, tuple(directions), bias, np.full(3, 5e-8), np.array([0.0, 0.0, 1.0]))
+    rates = np.gradient(angles, 0.1, axis=0)
+    up = np.array([0.0, 0.0, 1.0])
+    return Turns(time, turn, there, angles, C, tuple(directions), bias, np.full(3, 5e-8), up, rates)
 
 
 @few_and_all(60, few=4)

@@ -222,6 +222,8 @@ class Indexer:
         One-sigma error of the indexer's own angles and axes, which the body's attitude has in full.
     offset_sigma : float, m
         One sigma, along each of its axes, of how far the IMU sits from the axes of the indexer; estimated. 0: on them.
+    latency_sigma : float, s
+        One sigma of what the encoder is late or early by, where no start or stop of an axis shows it; one that shows is taken off.
     """
 
     record: EncoderRecord | None
@@ -229,6 +231,7 @@ class Indexer:
     lever_arm: ArrayLike | None = None
     angle_sigma: float = 0.0
     offset_sigma: float = 0.01
+    latency_sigma: float = 0.0
     key: ClassVar[str] = "indexer"
 
 

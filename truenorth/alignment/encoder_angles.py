@@ -8,7 +8,7 @@ body, which is smooth.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,7 +78,7 @@ class CarriedAngles:
         return math.hypot(self.noise * float(np.linalg.norm(rows)), part, 0.5 * self.swing * beyond**2)
 
 
-def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str]) -> CarriedAngles:
+def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str], late: float = 0.0) -> CarriedAngles:
     """Angles at each row of the IMU: the encoder's own at its rows, carried between them and beyond by the gyros.
 
     The turn rate of the IMU in the body is ``J(angles) d angles/dt``, the columns of ``J`` being the axes as the IMU sees them.
@@ -91,6 +91,8 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
     record : ImuRecord
     axes : sequence of {"x", "y", "z"}
         The outermost first.
+    late : float, s
+        By which the encoder's stamps are, which is taken off.
 
     Raises
     ------
@@ -101,15 +103,15 @@ def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str
 
     dtheta, _ = increments(record)
     edges = np.append(record.time[0] - record.interval, record.time)
-    angles = angles_at(encoder, edges, axes)
-    slack = ROUNDING * record.interval
-    rows = (encoder.time >= edges[0] - slack) & (encoder.time <= edges[-1] + slack)
+    angles = angles_at(encoder, edges, axes, late)
+    slack, stamps = ROUNDING * record.interval, encoder.time - late
+    rows = (stamps >= edges[0] - slack) & (stamps <= edges[-1] + slack)
     if np.count_nonzero(rows) < FEWEST:
         return CarriedAngles(
-            replace(encoder, time=edges, angles=_shaped(angles)), float(encoder.time[-1]), math.inf, 0.0, 0.0, *NONE
+            replace(encoder, time=edges, angles=_shaped(angles)), float(stamps[-1]), math.inf, 0.0, 0.0, *NONE
         )
-    time = encoder.time[rows]
-    given = angles_at(encoder, time, axes)
+    time = stamps[rows]
+    given = angles_at(encoder, time, axes, late)
     for _ in range(PASSES):
         J = _axes_seen(axes, 0.5 * (angles[1:] + angles[:-1]))
         turned = np.einsum("kai,ki->ka", _inverse(J, axes), dtheta)
@@ -154,8 +156,10 @@ def _shaped(angles: Array) -> Array:
     return angles[:, 0] if angles.shape[1] == 1 else angles
 
 
-def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:
+def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str], late: float = 0.0) -> Array:
     """(K, A) angles of an encoder at times (s), rad; straight lines between its rows (see :func:`carried_angles`).
+
+    Its stamps are `late` (s), which is taken off.
 
     Raises
     ------
@@ -171,19 +175,19 @@ def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> A
             f"axes {','.join(axes)} for {angles.shape[1]} angle(s) in {encoder.source}; expected one of x, y and z for each "
             "angle, the outermost first, such as z,x"
         )
-    slack = _slack(encoder)
-    if time.min() < encoder.time[0] - slack or time.max() > encoder.time[-1] + slack:
+    slack, stamps = _slack(encoder) + abs(late), encoder.time - late
+    if time.min() < stamps[0] - slack or time.max() > stamps[-1] + slack:
         raise DataError(
             f"{encoder.source}: angles from {encoder.time[0]:.3f} s to {encoder.time[-1]:.3f} s, wanted from {time.min():.3f} s to "
             f"{time.max():.3f} s: expected the encoder's log to cover the IMU's; cut the IMU's log (`record.between`)"
         )
-    columns = [np.interp(time, encoder.time, column) for column in angles.T]
+    columns = [np.interp(time, stamps, column) for column in angles.T]
     # Beyond its ends by a row at most: on along the first or last two rows.
     for column, given in zip(columns, angles.T, strict=True):
-        for outside, (a, b) in ((time < encoder.time[0], (0, 1)), (time > encoder.time[-1], (-2, -1))):
-            slope = (given[b] - given[a]) / (encoder.time[b] - encoder.time[a])
+        for outside, (a, b) in ((time < stamps[0], (0, 1)), (time > stamps[-1], (-2, -1))):
+            slope = (given[b] - given[a]) / (stamps[b] - stamps[a])
             edge = 0 if a == 0 else -1
-            column[outside] = given[edge] + slope * (time[outside] - encoder.time[edge])
+            column[outside] = given[edge] + slope * (time[outside] - stamps[edge])
     return np.stack(columns, axis=-1)
 
 
@@ -194,3 +198,17 @@ def _slack(encoder: EncoderRecord) -> float:
 def covered_until(encoder: EncoderRecord) -> float:
     """Time up to which an encoder's log covers an IMU's, s."""
     return float(encoder.time[-1]) + _slack(encoder)
+
+
+def orders(count: int) -> dict[str, Array]:
+    """Columns of angles and their signs, by the name of the reading: (count, count) matrices."""
+    own = np.eye(count)
+    signs = np.ones(count)
+    signs[0] = -1.0
+    orders = {"given": own, "first_reversed": own * signs, "last_reversed": own * signs[::-1]}
+    return orders if count == 1 else orders | {"exchanged": own[::-1]}
+
+
+def reading(encoder: EncoderRecord, axes: Sequence[str], order: Array, late: float = 0.0) -> Callable[[Array], Array]:
+    """``C_sb`` (K, 3, 3) at times, by the angles in an order, their delay taken off."""
+    return lambda time: np.swapaxes(C_bs_from_angles(axes, angles_at(encoder, time, axes, late) @ order.T), -1, -2)

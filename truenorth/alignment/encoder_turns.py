@@ -23,6 +23,7 @@ from truenorth.strapdown.inertial import earth_rotation, integrate
 Array = NDArray[np.float64]
 
 CELL = 0.1  # s, about which the base is looked at
+SLEW = 0.05  # s, before and after a time, in which its rate is seen: a start of a slew takes tenths of a second
 FAR = 0.75  # steps of the encoder's rows: farther from each of them a time has no angle of its own
 
 
@@ -75,7 +76,15 @@ def base_turns(
         chained([np.array(DIRECTIONS[a]) for a in axes[:i]], own[:, :i]) @ np.array(DIRECTIONS[axes[i]])
         for i in range(len(axes))
     ]
-    return Turns(time, turn, away < FAR * carried.step, own, C_bs, tuple(directions), gyro, sigma, mean[2])
+    there = away < FAR * carried.step
+    return Turns(time, turn, there, own, C_bs, tuple(directions), gyro, sigma, mean[2], rates_at(edges, angles, time))
+
+
+def rates_at(edges: Array, angles: Array, time: Array) -> Array:
+    """(K, A) rates of carried angles at times, rad/s."""
+    first, last = (np.clip(time + shift, edges[0], edges[-1]) for shift in (-SLEW, SLEW))
+    by = [np.interp(last, edges, column) - np.interp(first, edges, column) for column in angles.T]
+    return np.stack(by, axis=-1) / (last - first)[:, None]
 
 
 def _gyro_errors(

@@ -236,6 +236,7 @@ def on_indexer(r: Request) -> Alignment:
         lever_arm=None if indexer.lever_arm is None else -np.asarray(indexer.lever_arm, dtype=np.float64),
         angle_sigma=indexer.angle_sigma,
         offset_sigma=indexer.offset_sigma,
+        latency_sigma=indexer.latency_sigma,
         at=r.epoch,
         method=r.method,
         **r.common,

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from os import PathLike
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,10 +25,11 @@ from truenorth.alignment.answer import answer_of
 from truenorth.alignment.assumptions import FADING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.coarse_sensors import calibrated, matrix_evidence, shown_biases
-from truenorth.alignment.encoder_angles import CarriedAngles, angles_at, carried_angles
+from truenorth.alignment.encoder_angles import CarriedAngles, angles_at, carried_angles, orders, reading
 from truenorth.alignment.encoder_turns import base_turns
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
+from truenorth.alignment.late_encoder import NOT_LATE, late_effect, late_evidence, left_of
 from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT
@@ -40,7 +41,7 @@ from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import Mount, SwayAlignment, sway_align, swinging, usual_sway
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
 from truenorth.alignment.turning import infer_turning
-from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
+from truenorth.alignment.verdict import base_speed, claimed, grown, judged, model_evidence
 from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.earth import EARTH_RATE
@@ -50,6 +51,7 @@ from truenorth.core.position import Position
 from truenorth.errors.staying import StaticModel
 from truenorth.quality.codes import codes_evidence
 from truenorth.quality.encoder import encoder_evidence
+from truenorth.quality.encoder_delay import Delay, delay_of
 from truenorth.quality.encoder_errors import error_evidence
 from truenorth.quality.encoder_jumps import jump_evidence
 from truenorth.quality.encoder_slips import slip_of
@@ -70,6 +72,7 @@ OFFSET = 0.01  # m, one sigma along each of its axes: of an IMU from the axes of
 INDEXER_METHODS = ("auto", "swaying", *FADING)
 BLIND = 0.3  # of the earth's level rate: a gyro's bias of more may turn a coarse heading by 20 deg and more
 HEADINGS = 6  # all round
+AGAIN = 3  # times that a log is aligned: its encoder as stamped, less the delay that shows, and less what is left of it
 OFF_AXIS = math.radians(0.5)  # of a body that is said to be still, and an indexer of two axes
 
 
@@ -83,6 +86,7 @@ def align_rotary(
     lever_arm: ArrayLike | None = None,
     angle_sigma: float = 0.0,
     offset_sigma: float = OFFSET,
+    latency_sigma: float = 0.0,
     at: float | None = None,
     method: str = "auto",
     heading_limit: float = HEADING_LIMIT,
@@ -111,6 +115,9 @@ def align_rotary(
     offset_sigma : float, m
         One sigma, along each of its axes, of how far the IMU sits from the axes of the indexer, about which it swings in every
         slew; estimated. 0: on them.
+    latency_sigma : float, s
+        One sigma of what the encoder is late or early by. A delay that shows, where an axis starts, stops or turns back, is taken
+        off without it; where the axes turn at one rate none shows, and the attitude of the body has this one.
     at, heading_limit, progress
         As in :func:`truenorth.align`.
 
@@ -129,7 +136,7 @@ def align_rotary(
         Too short a record.
     """
     tell = progress or (lambda stage: None)
-    _must_make_sense(method, angle_sigma, offset_sigma)
+    _must_make_sense(method, angle_sigma=angle_sigma, offset_sigma=offset_sigma, latency_sigma=latency_sigma)
     given = None if imu is None else noise_in(record, imu_spec(imu))
     record = bridged(corrected(record, given))
     if record.duration < SHORTEST:
@@ -142,11 +149,41 @@ def align_rotary(
     C_n0_i = oba(coarse, position.lat, position.alt, history=False).C_n0_i
     own = method if method in FADING else "swaying"
     tell(f"aligning: {own}")
-    biases = None
+    asked = _Asked(record, encoder, position, given, axes, lever_arm, angle_sigma, offset_sigma, latency_sigma, own)
+    taken = NOT_LATE
+    for _ in range(AGAIN):
+        answer, evidence, late = _aligned(asked, task, coarse, C_n0_i, taken)
+        if late is None:
+            break
+        taken = late
+    return judged(answer, evidence, heading_limit)
+
+
+class _Asked(NamedTuple):
+    """What is given."""
+
+    record: ImuRecord
+    encoder: EncoderRecord | None
+    position: Position
+    given: ImuSpec | None
+    axes: Sequence[str]
+    lever_arm: ArrayLike | None
+    angle_sigma: float
+    offset_sigma: float
+    latency_sigma: float
+    own: str
+
+
+def _aligned(
+    asked: _Asked, task: Task, coarse: InertialIntegrals, C_n0_i: Array, taken: Delay
+) -> tuple[Alignment, list[Evidence], Delay | None]:
+    """The answer by an encoder whose delay is taken off, what is seen, and the delay to take off instead, if any."""
+    record, encoder, position, given, axes, lever_arm, angle_sigma, offset_sigma, latency_sigma, own = asked
+    rows, biases, late = np.array([task.epoch.row]), None, None
     if encoder is None:
         mount = Mount(np.zeros(3), offset_sigma)  # along the IMU's axes
     else:
-        carried = carried_angles(encoder, record, axes)
+        carried = carried_angles(encoder, record, axes, taken.size)
         angles = angles_at(carried.record, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb, offset_sigma)
@@ -155,7 +192,7 @@ def align_rotary(
     model, P_bias = StaticModel.of(spec), np.diag(spec.bias_variance)
     start = calibrated(CoarseStart(record, C_n0_i, position, model, P_bias, task.interval, rows), mount, _turned(spec))
     if own in FADING:
-        arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval)
+        arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval, taken.size)
         fine, unsure = faded_align(start, own, arm), 0.0
     else:
         fine, unsure = _from_headings(start, mount, spec, position.lat)
@@ -182,23 +219,30 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
-    evidence = _of_encoder(start, encoder, axes, task, spec)
-    evidence += [] if encoder is None else _of_angles(fine, record, carried, axes, task, spec, angle_sigma)
+    evidence = _of_encoder(start, encoder, axes, task, spec, taken.size)
+    if encoder is not None:
+        seen, rest = _of_angles(fine, record, carried, axes, task, spec, angle_sigma)
+        effect = late_effect(carried, axes, task.epoch.time, answer.C_nb)
+        answer = grown(answer, effect.times(left_of(taken, rest, latency_sigma)))
+        of_delay, late = late_evidence(rest, effect, claimed(answer), taken)
+        evidence += seen + of_delay
     evidence += _of_filter(answer, fine, spec, task, given=given is not None)
     if isinstance(fine, SwayAlignment):
         anew = aligned_anew(fine, start, mount, _turned(spec))
         evidence += late_gyro_evidence(fine, record, anew)
         evidence += gyro_matrix_evidence(fine, record, spec, anew, evidence)
-    return judged(answer, evidence, heading_limit)
+    return answer, evidence, late
 
 
-def _must_make_sense(method: str, angle_sigma: float, offset_sigma: float) -> None:
+def _must_make_sense(method: str, *, angle_sigma: float, offset_sigma: float, latency_sigma: float) -> None:
     if method not in INDEXER_METHODS:
         refuse(method, INDEXER_METHODS)
     if not 0.0 <= angle_sigma < math.inf:
         raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
     if not 0.0 <= offset_sigma < math.inf:
         raise UsageError(f"offset_sigma is {offset_sigma}; expected no negative length, m")
+    if not 0.0 <= latency_sigma < math.inf:
+        raise UsageError(f"latency_sigma is {latency_sigma}; expected no negative time, s")
 
 
 def _from_headings(start: CoarseStart, mount: Mount, spec: ImuSpec, lat: float) -> tuple[FineAlignment, float]:
@@ -236,14 +280,14 @@ def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task
 
 
 def _of_encoder(
-    start: CoarseStart, encoder: EncoderRecord | None, axes: Sequence[str], task: Task, spec: ImuSpec
+    start: CoarseStart, encoder: EncoderRecord | None, axes: Sequence[str], task: Task, spec: ImuSpec, late: float
 ) -> list[Evidence]:
     """What the encoder's angles and the record say against each other."""
     record = start.record
     if encoder is None:
         return record_evidence(record, task.motion, imu=spec)
     gyro_bias = math.sqrt(float(spec.bias_variance[:3].max()))
-    readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
+    readings = {name: reading(encoder, axes, order, late) for name, order in orders(len(axes)).items()}
     given = readings.pop("given")
     found = encoder_evidence(record, given, readings, gyro_bias)
     found += record_evidence(record, task.motion, given, imu=spec, right=start.right_record())
@@ -260,12 +304,12 @@ def _of_angles(
     task: Task,
     spec: ImuSpec,
     angle_sigma: float,
-) -> list[Evidence]:
-    """Errors of the encoder's angles, by the gyros and by how the base turns."""
+) -> tuple[list[Evidence], Delay | None]:
+    """Errors of the encoder's angles, by the gyros and by how the base turns; and its delay."""
     found = jump_evidence(carried.time, carried.by_gyros, carried.turned, carried.steps)
     turns = base_turns(fine, record, carried, axes, task.position.lat, spec)
     if turns is None:
-        return found
+        return found, None
     slip = slip_of(turns)
     if slip is not None and not found:
         found.append(slip.evidence())
@@ -273,30 +317,17 @@ def _of_angles(
     if len(axes) == 2:
         outer, inner = np.abs(turns.angles[-1] - turns.angles[0])
         times = outer / inner if inner > 2.0 * math.pi else 1.0  # of what comes back a delay is no zero
-    return found + error_evidence(turns, None if slip is None else slip.turns, times, angle_sigma)
+    found += error_evidence(turns, None if slip is None else slip.turns, times, angle_sigma)
+    return found, delay_of(turns, slip)
 
 
 def _arm_velocity(
-    record: ImuRecord, encoder: EncoderRecord | None, axes: Sequence[str], arm: Array, interval: float
+    record: ImuRecord, encoder: EncoderRecord | None, axes: Sequence[str], arm: Array, interval: float, late: float
 ) -> Array | None:
     """What a known arm makes of the velocity; None where there is none."""
     if encoder is None or not np.any(arm):
         return None
-    return turned_arm_velocity(record, _reading(encoder, axes, np.eye(len(axes))), arm, interval)
-
-
-def _orders(count: int) -> dict[str, Array]:
-    """Columns of angles and their signs, by the name of the reading: (count, count) matrices."""
-    own = np.eye(count)
-    signs = np.ones(count)
-    signs[0] = -1.0
-    orders = {"given": own, "first_reversed": own * signs, "last_reversed": own * signs[::-1]}
-    return orders if count == 1 else orders | {"exchanged": own[::-1]}
-
-
-def _reading(encoder: EncoderRecord, axes: Sequence[str], order: Array) -> Callable[[Array], Array]:
-    """``C_sb`` (K, 3, 3) at times, by the angles in an order."""
-    return lambda time: np.swapaxes(C_bs_from_angles(axes, angles_at(encoder, time, axes) @ order.T), -1, -2)
+    return turned_arm_velocity(record, reading(encoder, axes, np.eye(len(axes)), late), arm, interval)
 
 
 def angles_from_gyros(

@@ -69,7 +69,7 @@ class Fit:
     columns: Array  # (N, 3, m) whitened
     C: Array  # (m, m) covariance
     found: Array  # (m,)
-    groups: dict[str, slice]  # of the columns: what is looked for
+    groups: dict[str, slice]  # of the columns: what is looked for, and a delay
 
     def group(self, name: str) -> tuple[Array, Array]:
         """What is found of a group, and its covariance."""
@@ -125,6 +125,8 @@ def fitted(
         missing[row, :, 3 * i : 3 * i + 3] = np.eye(3)
     X = np.concatenate([nuisance, *named.values(), missing], axis=2)
     groups, first = {}, nuisance.shape[2]
+    if not steady(turns):  # the last of them
+        groups["late"] = slice(first - 1, first)
     for name, columns in named.items():
         groups[name] = slice(first, first + columns.shape[2])
         first += columns.shape[2]
@@ -167,12 +169,26 @@ def _nuisance(turns: Turns) -> tuple[Array, Array]:
         tilted = np.concatenate([tilted, np.cross(turns.directions[0], inner)[:, :, None]], axis=2)
     columns.append(tilted)
     sigma.append(np.full(tilted.shape[2], MOUNTED))
-    rates = np.gradient(turns.angles, turns.step, axis=0)
-    if np.max(np.std(rates, axis=0)) > STEADY * np.max(np.abs(rates)):
-        late = sum(u * rate[:, None] for u, rate in zip(turns.directions, rates.T, strict=True))
-        columns.append(np.asarray(late)[:, :, None])
+    if not steady(turns):
+        columns.append(_late(turns))
         sigma.append(np.array([LATE]))
     return np.concatenate(columns, axis=2), np.concatenate(sigma)
+
+
+def steady(turns: Turns) -> bool:
+    """Whether the axes turn at one rate: a delay is a zero then."""
+    rates = np.gradient(turns.angles, turns.step, axis=0)
+    return bool(np.max(np.std(rates, axis=0)) <= STEADY * np.max(np.abs(rates)))
+
+
+def _late(turns: Turns) -> Array:
+    """(K, 3, 1) what an encoder that is late by a second turns the base by.
+
+    By the rates of the moment: those from sample to sample are too small where an axis starts or stops, which is what shows a
+    delay: it came out a tenth too large.
+    """
+    late = sum(u * rate[:, None] for u, rate in zip(turns.directions, turns.rates.T, strict=True))
+    return np.asarray(late)[:, :, None]
 
 
 def _shown(turns: Turns, x: Array, pattern: Array) -> float:

@@ -50,6 +50,8 @@ class Turns:
         Their one-sigmas.
     up : (3,) array
         The vertical in the base, in the mean.
+    rates : (K, A) array, rad/s
+        Of the angles.
     """
 
     time: Array
@@ -61,6 +63,7 @@ class Turns:
     gyro: Array
     gyro_sigma: Array
     up: Array
+    rates: Array
 
     @property
     def step(self) -> float:
@@ -80,6 +83,7 @@ class Turns:
             C_bs=self.C_bs[rows],
             directions=tuple(u[rows] for u in self.directions),
             gyro=self.gyro[rows],
+            rates=self.rates[rows],
         )
 
 

@@ -208,6 +208,14 @@ OF_SENSORS = {
         "the zero of the inner axis' angle is off by {off:deg|+.3f} ± {sigma:deg|.3f} deg, or the encoder is late or early: the "
         "base would wobble as the outer axis turns"
     ),
+    "encoder.late": (
+        "the encoder is late by {late:ms|+.2f} ± {sigma:ms|.2f} ms, as the base would turn at each start and stop of an axis, and "
+        "the axes turn where the answer is asked for: the body is off by as much as they turn in that time"
+    ),
+    "encoder.late_taken": (
+        "the encoder is late by {late:ms|+.2f} ± {sigma:ms|.2f} ms, as the base would turn at each start and stop of an axis: that "
+        "is taken off its times"
+    ),
     "gnss.turned": "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions",
     "gnss.height_drifts": "the GNSS heights drift by {size:.2g} m against the velocities, {rate:+.2g} m/s (ratio {ratio:.0f})",
     "gnss.height_steps": (
