@@ -70,7 +70,7 @@ NOT_SAID = {
         "acceleration_noise": "fitted",
         "heading": "found",
     },
-    "Indexer": {"record": ELSEWHERE, "offset_sigma": ONE_VALUE},
+    "Indexer": {"record": ELSEWHERE, "offset_sigma": ONE_VALUE, "latency_sigma": ONE_VALUE},
     "Positions": {"record": ELSEWHERE},
 }
 
