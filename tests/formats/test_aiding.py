@@ -369,3 +369,12 @@ def test_a_yaw_is_asked_which_way_it_counts(tmp_path):
     for name, heading in (("yaw", 30.0), ("-yaw", -30.0)):
         C = read_master(path, columns=f"heading={name}").C_nb[0]
         assert np.degrees(np.arctan2(C[0, 1], C[1, 1])) == pytest.approx(heading)
+
+
+def test_a_course_beyond_all_numbers_is_named(tmp_path):
+    """1e490 is infinite: its sine warned, and the row passed for one without a velocity."""
+    path = tmp_path / "gnss.csv"
+    rows = [f"{k},48.0,11.0,500.0,1.0,{'1e490' if k == 2 else '10'}" for k in range(5)]
+    path.write_text("\n".join(["time,lat,lon,alt,speed,course", *rows]))
+    with pytest.raises(DataError, match=r"row 3, column VE: inf"):
+        read_gnss(path)

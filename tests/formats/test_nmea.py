@@ -100,6 +100,7 @@ def test_the_content_tells_and_broken_ends_are_passed_over(tmp_path):
         ),
         (sentence("GPGGA,120001,4807.038,N"), ["line 2: 4 fields", "cut short"]),
         (rmc("120001", speed="fast"), ["line 2, RMC: speed 'fast'"]),
+        (rmc("120001", course="1e490"), ["line 2, RMC: course '1e490'"]),
         (gga("115949"), ["line 2, column time", "goes back"]),
     ],
 )

@@ -224,5 +224,7 @@ def _velocity(found: Found) -> Array | None:
         # A receiver that stands still leaves its course empty.
         course = np.where((speed == 0.0) & np.isnan(course), 0.0, course)
         up = found.values.get("VU", np.full(len(speed), np.nan))
-        v_n = np.column_stack([speed * np.sin(course), speed * np.cos(course), up])
+        there = np.isfinite(course)
+        angle, left = np.where(there, course, 0.0), np.where(there, 0.0, course)  # what is no number stays none
+        v_n = np.column_stack([speed * np.sin(angle) + left, speed * np.cos(angle) + left, up])
     return v_n

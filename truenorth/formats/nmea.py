@@ -150,9 +150,12 @@ def _sentences(path: Path) -> Iterator[tuple[int, str, list[str]]]:
 
 def _number(text: str, where: str, what: str) -> float:
     try:
-        return float(text) if text else math.nan
+        value = float(text) if text else math.nan
     except ValueError:
-        raise DataError(f"{where}: {what} {text!r}; expected a number") from None
+        value = math.inf
+    if math.isinf(value):
+        raise DataError(f"{where}: {what} {text!r}; expected a number")
+    return value
 
 
 def _clock(text: str, where: str) -> float:
