@@ -49,7 +49,7 @@ def test_an_accelerometer_that_steps_is_said_and_counts(seed: int) -> None:
     step = np.array([0.0, 0.3, 0.0]) * (record.time > 100.0)[:, None] * record.interval
     for fault in (False, True):
         answer = align(replace(record, accel=record.accel + fault * step), place, "industrial")
-        assert any(item.key == "bias.accel_steps" for item in answer.evidence) == fault
+        assert any(item.key == "bias.accel_steps_level" for item in answer.evidence) == fault
         if answer.status == "level_only":
             assert np.max(np.abs(misses(answer, truth)["level"])) < 4.0
 

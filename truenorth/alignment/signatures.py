@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,4 +74,5 @@ def level_step_evidence(fine: FineAlignment, spec: ImuSpec) -> list[Evidence]:
     left = match.left.copy()
     left[2] = 0.0
     accel = np.arange(len(match.ratio)) % 6 >= 3
-    return bias_step_evidence(fine, spec, match._replace(ratio=np.where(accel, match.ratio, 0.0), left=left))
+    steps = bias_step_evidence(fine, spec, match._replace(ratio=np.where(accel, match.ratio, 0.0), left=left))
+    return [replace(step, key="bias.accel_steps_level") for step in steps]

@@ -63,6 +63,10 @@ OF_SENSORS = {
         "the {axis} accelerometer's bias changes by about {size:ug|} ug near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
         "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "bias.accel_steps_level": (
+        "the {axis} accelerometer's bias changes by about {size:ug|} ug near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
+        "gives {chance:.0f} at most); level moves by {level:angle}"
+    ),
     "rival.gyro_wanders": (
         "gyro biases that change by some {size:deg/h|} deg/h over the log fit the measurements better than those of the "
         "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
