@@ -96,10 +96,11 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         found.append(rows_of("position", place, measured, sigma, states))
     moving = record.has_velocity & sound
     if moving.any() and record.v_n is not None:
-        measured = record.v_n / (1.0 - mounting.clock.rate)  # by the IMU's seconds
+        by_imu = 1.0 / (1.0 - mounting.clock.rate)  # of a metre in a second of the receiver's, by the IMU's seconds
+        measured = by_imu * record.v_n
         if not heights:
             measured[:, 2] = np.nan
-        sigma = _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
+        sigma = by_imu * _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
         states = _of_receiver(mounting, "GNSS", "lever arm", "lag")
         shown = rows_of("velocity", moving, measured, sigma, states)
         if "lag" in states and states["lag"].drift > 0.0:
