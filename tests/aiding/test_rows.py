@@ -33,7 +33,7 @@ DRIFTING = "velocity by another clock"
 ROWS = {**KINDS, "odometer": WHEEL, "heading": HEADING, "magnetic field": FIELD, "smoothed velocity": SMOOTHED_VELOCITY}
 ROWS[DRIFTING] = KINDS["velocity"]
 
-LATE = {"body velocity": 0.05, "odometer": 0.05, "heading": 0.02 * np.linalg.norm(W_B)}
+LATE = {"body velocity": 0.05, "odometer": 0.05}
 
 
 def _aiding(kind):
@@ -98,7 +98,7 @@ def test_row_is_the_derivative_of_the_prediction(kind):
     """Central differences; steps small enough that what is left is of the second order of a small step.
 
     The lag enters multiplied by the change of what is measured, whose own change with attitude the row leaves out: its
-    assumed value here is 20 ms, so 2 % of the effect of acceleration, and of the turn on a heading, is granted.
+    assumed value here is 20 ms, so 2 % of the effect of acceleration is granted.
     """
     z, H, n = _predicted(kind, np.zeros(18 + _extra_states(kind)))
     rows = np.isfinite(z)

@@ -28,6 +28,7 @@ HEADING_SIGMA = math.radians(1.0)  # of a baseline whose receiver says nothing
 ODOMETER_SIGMA = 0.05  # m/s, besides the pulses' size
 LOG_SIGMA = 0.1  # m/s
 DRIFT_TIME = 3.0 * 3600.0  # s, of a log's drift where nobody knows it: between tides and eddies
+UNEVEN = math.radians(3.0)  # pitch of a line of two antennas: who gives its heading says nothing of 5 cm up in a metre
 BARO_SIGMA = 1.0  # m: noise; the weather is a group of its own, see `aids.WEATHER`
 FASTEST = 10.0  # Hz: faster odometers are averaged, since their errors are not new ten times a second
 
@@ -110,7 +111,7 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
     if turned.any() and record.heading is not None:
         states = _of_receiver(mounting, "GNSS", "lag")
         if mounting.angle_sigma > 0.0:
-            states["bias"] = Group("GNSS heading bias", np.array([mounting.angle_sigma]), unit="rad")
+            states |= state("GNSS", "mounting", [max(mounting.angle_sigma, UNEVEN), mounting.angle_sigma])
         said = None if record.heading_sigma is None else record.heading_sigma[:, None]
         sigma = np.tile(_or_default(said, np.array([HEADING_SIGMA]), len(record)), 3)
         found.append(

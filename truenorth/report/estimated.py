@@ -25,7 +25,6 @@ UNITS = {
     "scale": ("%", 100.0),
     "scale factors": ("ppm", 1e6),
     "mounting": DEG,
-    "heading bias": DEG,
     "attitude bias": DEG,
     "lag": ("ms", 1e3),
     "compliance": ("deg/g", 180.0 / np.pi * 9.80665),

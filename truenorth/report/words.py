@@ -10,7 +10,7 @@ WORDS = (
     "warning", "error", "note", "fixed", "free", "baro", "gnss", "GNSS position", "GNSS velocity", "odometer",
     "velocity log", "barometer", "zero velocity", "zero rotation", "odometer scale", "odometer mounting", "odometer lever arm",
     "odometer lag", "odometer compliance", "GNSS lever arm", "GNSS lag", "GNSS velocity lag", "GNSS unseen arm", "GNSS bias",
-    "velocity log scale",
+    "GNSS mounting", "velocity log scale",
     "velocity log mounting", "velocity log lever arm", "velocity log lag", "velocity log bias", "barometer bias", "barometer lag",
     "velocity log drift", "levelled velocity log", "deflection of the vertical", "position fix", "azimuth reset",
     "holds", "does not hold", "holds in part", "too few runs", "Aligned, with warnings", "Navigated, with warnings",
