@@ -2,7 +2,7 @@
 
 Of rates such a row says nothing new, and is left out. What is left comes at uneven steps, because the writer's clock is coarser
 than the sensor's: a row is written at the first tick after its sample, late by less than a tick. Where the stamps that are left
-stay within a tick of an even clock that drifts slowly (their mean over `HALF` rows to either side), the samples have that clock,
+stay within a tick of an even clock that drifts slowly (their mean over the rows around), the samples have that clock,
 as early as the earliest of the stamps, for no row is written before it is sampled. Else the stamps stay as they are.
 
 Rows that a log doubles, each with a time of its own, look alike, but make its clock wrong: they come by chance. Rows that are held
@@ -25,6 +25,7 @@ from truenorth.core.numeric import is_number
 from truenorth.core.remembered import remembered
 from truenorth.quality.one_pace import at_one_pace, pace_findings
 from truenorth.quality.repeats import repeats_of
+from truenorth.quality.rounded_stamps import SHORTEST, at_even_steps, rounded_findings, smooth_clock
 from truenorth.quality.sampling import Finding
 from truenorth.records import Guess, ImuRecord
 
@@ -36,15 +37,13 @@ LEAST = 0.05  # of the rows: fewer move no answer, as a rule, and are not counte
 LONGEST = 4.5  # rows of a run in the mean, and means in the longest: the gap, in intervals, that an alignment bridges
 BREAK = 3.5  # writer's steps: in a longer one the writer stood still, and its clock may have jumped
 GONE = 1.5  # of the median step, above which a sample is missing
-HALF = 100  # rows to either side over which the sensor's clock is even
-SHORTEST = 10  # rows of a stretch that have a clock of their own
 WITHIN = 1.0  # writer's steps, by which stamps may be off an even clock
 ONE_LENGTH = 0.2  # variance of the lengths of runs over that of chance; it is (1 - p) / (1 + p) of rows doubled with probability p
 
 
 def as_sampled(record: Any) -> ImuRecord:
-    """A record or a table as the record of the sensor's own samples, at one rate; a record without held rows as it is."""
-    return at_one_pace(at_own_rate(ImuRecord.of(record)))
+    """A record or a table as the record of the sensor's own samples, at its own steps and one rate; a sound record as it is."""
+    return at_one_pace(at_even_steps(at_own_rate(ImuRecord.of(record))))
 
 
 def epoch_sampled(at: float | None, record: Any, sampled: ImuRecord) -> float | None:
@@ -101,9 +100,9 @@ def at_own_rate(record: ImuRecord) -> ImuRecord:
 
 
 def sampled_findings(record: ImuRecord) -> list[Finding]:
-    """A note where rows that are held were left out, and where the rate of the rows changes."""
+    """A note where rows that are held were left out, where stamps are rounded, and where the rate of the rows changes."""
     held = [Finding("note", "repeated_rows", taken.why) for taken in record.taken_for if taken.what == HELD]
-    return held + pace_findings(record)
+    return held + rounded_findings(record) + pace_findings(record)
 
 
 def _even_clock(record: ImuRecord, first: NDArray[np.intp]) -> Array | None:
@@ -119,7 +118,7 @@ def _even_clock(record: ImuRecord, first: NDArray[np.intp]) -> Array | None:
     for begin, end in zip(starts, np.append(starts[1:], len(stamps)), strict=True):
         begin += 1  # the sample of the first row may be older than the row
         if end - begin >= SHORTEST:
-            clock[begin:end] = _smooth(stamps[begin:end])
+            clock[begin:end] = smooth_clock(stamps[begin:end])
             late[begin:end] = stamps[begin:end] - clock[begin:end]
     if np.abs(late).max() > WITHIN * tick:
         return None
@@ -128,21 +127,3 @@ def _even_clock(record: ImuRecord, first: NDArray[np.intp]) -> Array | None:
         if begin + 2 < len(clock) and stretch[begin] == stretch[begin + 2]:
             clock[begin] = 2.0 * clock[begin + 1] - clock[begin + 2]
     return clock if np.all(np.diff(clock) > 0.0) else None
-
-
-def _smooth(stamps: Array) -> Array:
-    """Stamps by their mean over the rows around them; near the ends by a line."""
-    count = len(stamps)
-    half = min(HALF, (count - 1) // 2)
-    width = 2 * half + 1
-    trend = np.linspace(stamps[0], stamps[-1], count)  # sums of small numbers keep their digits
-    off = stamps - trend
-    sums = np.concatenate([[0.0], np.cumsum(off)])
-    smooth = np.empty(count)
-    smooth[half : count - half] = (sums[width:] - sums[:-width]) / width
-    rows = np.arange(width) - half
-    for part, inside in ((slice(0, width), rows < 0), (slice(count - width, count), rows > 0)):
-        x = off[part]
-        line = x.mean() + rows * float(rows @ x) / float(rows @ rows)
-        smooth[part][inside] = line[inside]
-    return smooth + trend

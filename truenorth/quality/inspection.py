@@ -14,6 +14,7 @@ from truenorth.quality.held import at_own_rate, sampled_findings
 from truenorth.quality.one_pace import at_one_pace
 from truenorth.quality.plausibility import Turning, check_plausibility
 from truenorth.quality.regimes import KINDS, Kind, MotionSummary, Regime, motion_summary
+from truenorth.quality.rounded_stamps import at_even_steps
 from truenorth.quality.sampling import Finding, Sampling, check_sampling
 from truenorth.records import ImuRecord
 
@@ -220,7 +221,7 @@ def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
         Latitude; lets the earth's rate be checked by its vertical part too.
     """
     written = ImuRecord.of(record)
-    samples = at_own_rate(written)
+    samples = at_even_steps(at_own_rate(written))
     record = at_one_pace(samples)
     motion = motion_summary(record)
     sampling, findings = check_sampling(record)

@@ -12,6 +12,7 @@ RECORD = {
     "record.no_gravity": "{text}",
     "record.repeated_rows": "{text}",
     "record.rate_changes": "{text}",
+    "record.rounded_stamps": "{text}",
     "record.no_noise": "{text}",
     "record.frozen": "{text}",
     "record.gaps": "{text}",
