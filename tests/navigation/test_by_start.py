@@ -10,7 +10,7 @@ from tests.runs import some
 from truenorth.core.position import Position
 from truenorth.filters import LinearSystem, kalman
 from truenorth.navigation import navigate
-from truenorth.navigation.by_start import UP, Others, _moved, _shifts, start_evidence, stretch
+from truenorth.navigation.by_start import UP, Others, _shifts, start_evidence, stretch
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import Sway, Tone, simulate
 from truenorth.state.layout import BG
@@ -66,8 +66,8 @@ def test_errors_of_the_start_are_independent_and_within_its_covariance():
     whole = np.vstack([shifts, np.zeros((2, 2))])
     np.testing.assert_allclose(whole.T @ np.linalg.solve(A @ A.T, whole), np.eye(2), atol=1e-6)
     np.testing.assert_allclose(shifts[UP] @ shifts[UP], of_both[0, 0])
-    other = _moved(start, shifts[:, 1])
-    np.testing.assert_allclose(other.gyro_bias - start.gyro_bias, shifts[BG, 1])
+    other = start.with_errors(shifts[:, 1])
+    np.testing.assert_allclose(start.gyro_bias - other.gyro_bias, shifts[BG, 1])
 
 
 def test_a_heading_that_its_gyro_alone_has_turned_is_one_error():

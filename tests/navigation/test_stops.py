@@ -107,13 +107,16 @@ def test_soft_braking_at_the_end_of_a_stop_is_no_rest(standing, sign, stands):
 
 
 def test_a_second_is_compared_with_those_inside_its_stop(standing):
-    """A base that rests throughout keeps its ends; times that a user gives are left as they are."""
+    """A base that rests throughout keeps its ends, and times that a user gives their seconds: those without any motion as rest."""
     alone = seconds_at_rest(standing)[0]
     assert alone[0] < 1.0
     assert alone[-1] > standing.time[-1] - 1.5
     assert len(alone) == len(np.unique(alone)) >= 298
-    given = zero_updates(standing, [(20.0, 22.0), (40.0, 41.0)])[0]
-    assert given.time.tolist() == [20.5, 21.5, 40.5]
+    velocity, rotation = zero_updates(standing, [(20.0, 24.0), (40.0, 41.0)])
+    np.testing.assert_allclose(np.sort(velocity.time), [20.5, 21.5, 22.5, 23.5, 40.5], atol=0.75)
+    assert set(rotation.time) < set(velocity.time)
+    assert len(rotation.time) == 3  # whole seconds of the record inside the first stop
+    np.testing.assert_array_equal(velocity.sigma[:, 0] == STILL_VELOCITY, np.isin(velocity.time, rotation.time))
 
 
 @pytest.mark.slow

@@ -22,17 +22,15 @@ given heading as they were. The rule is ours.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import dcm_from_rotation_vector
-from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import nearest
 from truenorth.state.evidence import Evidence, note
-from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.layout import BG, PHI, STATES
 from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
@@ -60,7 +58,7 @@ class Others:
         """Those of a start."""
         shifts, variance = _shifts(start)
         parts = [min(1.0, NEAR / max(float(np.linalg.norm(shift[PHI])), 1e-300)) for shift in shifts.T]
-        starts = tuple(_moved(start, part * shift) for part, shift in zip(parts, shifts.T, strict=True))
+        starts = tuple(start.with_errors(part * shift) for part, shift in zip(parts, shifts.T, strict=True))
         return cls(starts, tuple(parts), start.time, variance)
 
     def free(self, time: Array) -> Array:
@@ -164,18 +162,3 @@ def _shifts(start: Start) -> tuple[Array, Array]:
     )  # heading may be known, or all of its error be the gyro's
     seen = np.where(values > ROUNDING, values, np.inf)
     return P @ (A / scale[:, None]).T @ ways / np.sqrt(seen), of_both
-
-
-def _moved(start: Start, x: Array) -> Start:
-    """The start with these errors (15,) in it."""
-    R_M, R_N = radii(start.lat)
-    return replace(
-        start,
-        C_nb=dcm_from_rotation_vector(-x[PHI]) @ start.C_nb,
-        v_n=start.v_n + x[DV],
-        lat=start.lat + x[DP][1] / (R_M + start.alt),
-        lon=start.lon + x[DP][0] / ((R_N + start.alt) * np.cos(start.lat)),
-        alt=start.alt + x[DP][2],
-        gyro_bias=start.gyro_bias + x[BG],
-        accel_bias=start.accel_bias + x[BA],
-    )

@@ -44,16 +44,22 @@ def seen_in_body(aiding: Sequence[Aiding]) -> bool:
     return shows_body_velocity(aiding) and not any(source.over_ground for source in aiding)
 
 
+def shows_stops_alone(aiding: Sequence[Aiding]) -> bool:
+    """Whether a velocity of zero is all that is seen of how the vehicle moves."""
+    shown = [source for source in aiding if source.does == "measurement"]
+    return any(source.row.name == "velocity" for source in shown) and not any(source.over_ground for source in shown)
+
+
 def with_curve(track: Track, aiding: Sequence[Aiding]) -> Track:
-    """The track with what the curve of its velocity adds to the covariance of velocity and place, where it is seen in the body.
+    """The track with what the curve of its velocity adds to the covariance of velocity and place, seen not over ground.
 
     Parameters
     ----------
     track : Track
     aiding : sequence of Aiding
-        Its measurements; where none of them shows velocity in the body, the track is what it was.
+        Its measurements; where none of them shows velocity in the body, or stops alone, the track is what it was.
     """
-    if not shows_body_velocity(aiding) or not len(track.P):
+    if not (shows_body_velocity(aiding) or shows_stops_alone(aiding)) or not len(track.P):
         return track
     P = track.P.copy()
     psi = P[:, 2, 2]

@@ -14,7 +14,7 @@ from truenorth.aiding.source import Aiding
 from truenorth.alignment.unsaid import unsaid_evidence
 from truenorth.core.errors import UsageError
 from truenorth.estimate.memory import EITHER, IN_BODY, OVER_GROUND
-from truenorth.navigation.curve import seen_in_body, shows_body_velocity
+from truenorth.navigation.curve import seen_in_body, shows_body_velocity, shows_stops_alone
 from truenorth.navigation.result import Altitude
 from truenorth.records import GnssRecord, Late
 from truenorth.records.specs import ImuSpec
@@ -189,7 +189,10 @@ def fed_back(aiding: Sequence[Aiding]) -> int:
 
     Where both are seen, one fix does not make the ground known for good: before and after it velocity is known in the body. So the
     covariance says at each correction which of the two is known better.
+
+    Stops alone show velocity in either, and nothing of heading: a velocity that has drifted to 5 m/s by the next stop, and is not
+    seen in the body, seems to turn with it. Of 60 drives 8 were up to 94 sigmas off on the way.
     """
-    if seen_in_body(aiding):
+    if seen_in_body(aiding) or shows_stops_alone(aiding):
         return IN_BODY
     return EITHER if shows_body_velocity(aiding) else OVER_GROUND

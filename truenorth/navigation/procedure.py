@@ -44,18 +44,17 @@ from truenorth.navigation.given import (
     record_of,
     said_of,
     taken_over,
-    ungated,
     with_rows,
 )
 from truenorth.navigation.gyro_moment import gyros_of_another_moment
 from truenorth.navigation.passes import COARSE, filtered, quick_swing
 from truenorth.navigation.plan import Plan
-from truenorth.navigation.recentred import linear_within, recentred
+from truenorth.navigation.restarted import about_its_start
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, second_look
 from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
-from truenorth.navigation.stops import zero_updates
+from truenorth.navigation.stops import while_it_stands, zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence
@@ -227,12 +226,15 @@ def _by_specification(
     check_places(given, begin, height)
     if zupt is not None:
         tell("looking for stops")
-        plan = replace(plan, always=[*zero_updates(record, zupt, *logs_of_speed(given)), *disturbances])
+        stops = zero_updates(record, zupt, *(logs := logs_of_speed(given)))
+        if stops and isinstance(zupt, str) and logs == (None, None, None):
+            stops = while_it_stands(stops, plan.run([]))
+        plan = replace(plan, always=[*stops, *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     if isinstance(wheel := given.get(Odometer.key), Odometer):
         check_unit(plan.record, wheel.record, record_of(given, Gnss), wheel.mounting or wheel.usual)
     tell("navigating")
-    plan = _about_its_heading(plan, given)
+    plan = about_its_start(plan, given)
     done, loose = (
         filtered_by_possible_arm(plan, given, smooth) if check_clocks else (filtered(plan, given, smooth), None)
     )
@@ -249,7 +251,7 @@ def _by_specification(
     result = Navigation(
         status="navigated",
         evidence=(),
-        track=_counted_whole(with_curve(track, plan.sources(used)), given),
+        track=_counted_whole(with_curve(track, [*plan.sources(used), *plan.always]), given),
         altitude=height,
         smoothed=smooth,
         gaps=gaps,
@@ -264,13 +266,6 @@ def _by_specification(
         return judged_navigation(result, counted_once(evidence), least)
     tell(f"damping: {damping.method}")
     return _damped(replace(result, evidence=tuple(evidence)), plan, reference, noise, damping, fixes)
-
-
-def _about_its_heading(plan: Plan, given: Mapping[str, Aid]) -> Plan:
-    """The plan from the heading that the log shows, where its start was unsure (:mod:`truenorth.navigation.recentred`)."""
-    aiding = {True: plan.sources(given), False: plan.sources(ungated(given))}
-    run = lambda at, gated: replace(plan, start=at).run(aiding[gated], smooth=not gated)  # noqa: E731
-    return replace(plan, start=recentred(run, plan.start, linear_within(given))) if aiding[True] else plan
 
 
 def _damped(

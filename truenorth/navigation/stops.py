@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from truenorth.quality.aid_noise import STANDING
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.quality.regimes import DISTURBED, STILL, motion_summary
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
+from truenorth.state.layout import DV
+from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
@@ -39,6 +42,7 @@ APART = 1.5  # s: seconds further apart are two rests
 EDGE = 3  # seconds at either end of a stop, in which a vehicle may still roll, or set off
 INSIDE = 10  # seconds, further in, with which they are compared
 FEWEST_SECONDS = 3  # of a stop: of fewer nothing says whether their force is tilt or braking
+KNOWN = 3.0  # m/s, one sigma of the velocity of a free INS that says whether its vehicle moves
 SPREAD = 0.25  # s before and after the middle of a second at rest, between which its row is drawn
 
 
@@ -155,9 +159,9 @@ def longest_rest(*seconds: Array) -> Array:
     return longest if len(longest) >= LONG_ENOUGH else all_of[:0]
 
 
-def _near(at: Array, times: Array) -> NDArray[np.intp]:
+def _near(at: Array, times: Array, within: float = NEAR) -> NDArray[np.intp]:
     """How many of these times lie near each of those."""
-    return np.searchsorted(times, at + NEAR) - np.searchsorted(times, at - NEAR)
+    return np.searchsorted(times, at + within) - np.searchsorted(times, at - within)
 
 
 def velocity_at_rest(at: Array, *logs: OdometerRecord | GnssRecord | VelocityRecord | None) -> float:
@@ -266,7 +270,7 @@ def zero_updates(
     Parameters
     ----------
     stops : "auto" or sequence of (start, stop)
-        Found from the IMU, or given, s on the record's clock.
+        Found from the IMU, or given, s on the record's clock. Of those that are given the IMU says in which seconds nothing moves.
     odometer, gnss, velocity : records, optional
         Sensors of speed that have a say in what is found.
 
@@ -287,8 +291,17 @@ def zero_updates(
             if not stop > start:
                 raise UsageError(f"stop from {start:.12g} s to {stop:.12g} s; expected its end after its beginning")
             seconds.append(np.arange(start, stop, 1.0) + 0.5)
-        still, disturbed = np.empty(0), np.concatenate(seconds) if seconds else np.empty(0)
+        given = np.concatenate(seconds) if seconds else np.empty(0)
+        seen = stops_in(record)[0]
+        still = seen[_inside(seen, stops)]
+        disturbed = given[_near(given, still, 0.5) == 0]
     return updates_at(record, still, disturbed, shaken)
+
+
+def _inside(at: Array, stops: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """Which seconds around these times lie in a stop."""
+    inside = [(at - 0.5 >= start) & (at + 0.5 <= stop) for start, stop in stops]
+    return np.any(inside, axis=0) if inside else np.zeros(len(at), dtype=np.bool_)
 
 
 def updates_at(record: ImuRecord, still: Array, disturbed: Array, shaken: float = DISTURBED_VELOCITY) -> list[Aiding]:
@@ -306,4 +319,28 @@ def updates_at(record: ImuRecord, still: Array, disturbed: Array, shaken: float 
     if still.size:
         angle = np.tile(np.maximum(angle_scatter(record, still), LEAST_ANGLE), (still.size, 1))
         found.append(Aiding(NO_ROTATION, "rotation", drawn, np.zeros((still.size, 3)), angle))
+    return found
+
+
+def while_it_stands(updates: Sequence[Aiding], free: Track) -> list[Aiding]:
+    """Updates of stops without those at which a free INS still knows that its vehicle moves.
+
+    An even speed looks like rest to an IMU: 16 m/s for the first 9 s of a drive did, and the start knew it to .1 m/s.
+
+    Parameters
+    ----------
+    updates : sequence of Aiding
+    free : Track
+        From the start, with its covariance.
+    """
+    speed, sigma = np.linalg.norm(free.v_n[:, :2], axis=1), free.sigma[:, DV][:, :2].max(axis=1)
+    known = np.logical_and.accumulate(sigma < KNOWN)
+    moves = known & (speed > STANDING + DIFFERS * sigma)
+    found = []
+    for source in updates:
+        at = np.clip(np.searchsorted(free.time, source.time), 0, len(free.time) - 1)
+        stands = ~moves[at] | (source.time > free.time[-1])
+        if stands.any():
+            rows = source.time[stands], source.measured[stands], source.sigma[stands]
+            found.append(replace(source, time=rows[0], measured=rows[1], sigma=rows[2]))
     return found

@@ -9,7 +9,9 @@ from typing import SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.state.layout import STATES
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import radii
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
 from truenorth.state.mounting import Clock, Drift, Mounting
 from truenorth.state.prior import WholeBiases
 
@@ -87,6 +89,20 @@ class Start(State):
         """A state, its errors known by a covariance."""
         return cls(
             state.time, state.C_nb, state.v_n, state.lat, state.lon, state.alt, state.gyro_bias, state.accel_bias, P
+        )
+
+    def with_errors(self, x: Array) -> Start:
+        """The start with errors (15,) in it: of motion computed minus true, of biases true minus assumed."""
+        R_M, R_N = radii(self.lat)
+        return replace(
+            self,
+            C_nb=dcm_from_rotation_vector(-x[PHI]) @ self.C_nb,
+            v_n=self.v_n + x[DV],
+            lat=self.lat + x[DP][1] / (R_M + self.alt),
+            lon=self.lon + x[DP][0] / ((R_N + self.alt) * np.cos(self.lat)),
+            alt=self.alt + x[DP][2],
+            gyro_bias=self.gyro_bias - x[BG],
+            accel_bias=self.accel_bias - x[BA],
         )
 
     def states_of(self, name: str) -> slice:
