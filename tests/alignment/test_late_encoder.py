@@ -6,7 +6,8 @@ import pytest
 import truenorth as tn
 from tests.runs import few_and_all
 from truenorth.alignment import rotary
-from truenorth.alignment.late_encoder import NOT_LATE, late_evidence, left_of
+from truenorth.alignment.encoder_angles import carried_angles
+from truenorth.alignment.late_encoder import NOT_LATE, coarse_delay, late_evidence, left_of
 from truenorth.core.attitude import dcm_from_euler, misalignment, rotation_vector_from_dcm
 from truenorth.core.earth import normal_gravity
 from truenorth.core.indexing import C_bs_from_angles
@@ -69,6 +70,27 @@ def answered(seed, angle, late, axes="x", **more):
 
 def off(answer):
     return misalignment(answer.C_nb, C_NB) / np.sqrt(np.diag(answer.phi_covariance))
+
+
+@few_and_all(8, few=2)
+def test_an_encoder_that_is_late_by_tenths_of_a_second(runs):
+    """What is linear in a delay found .1 s of -.5 s, and level was 52 sigmas off, `aligned`."""
+    for seed in range(runs):
+        late, axes = (-0.5, 0.5, 0.15, 1.2)[seed % 4], ("x", "zx", "y", "xz")[seed % 4]
+        answer = answered(seed, to_and_fro, late, axes)
+        assert np.abs(off(answer)).max() < 4.0
+        assert [item.key for item in answer.evidence if item.key.startswith("encoder.late")] == ["encoder.late_taken"]
+        (taken,) = (item for item in answer.evidence if item.key == "encoder.late_taken")
+        assert abs(taken.figures["late"] - late) < 4.0 * taken.figures["sigma"]
+
+
+@few_and_all(6, few=2)
+def test_a_sound_encoder_has_no_long_delay(runs):
+    """However its axes turn; and one that turns at one rate shows none."""
+    for seed in range(runs):
+        for angle, late in ((to_and_fro, 0.0), (at_rest, 0.02), (one_pace, 0.5)):
+            record, encoder, _ = indexed(seed, angle, late)
+            assert coarse_delay(carried_angles(encoder, record, "x")) == NOT_LATE
 
 
 @few_and_all(12, few=3)
@@ -145,7 +167,9 @@ def test_what_a_delay_makes_of_an_answer():
     assert late_evidence(faint._replace(beyond=2.0), rate, sigma, NOT_LATE) == ([], None)
     (item,), take = late_evidence(None, rate, sigma, clear)
     assert (item.key, item.kind, take) == ("encoder.late_taken", "note", None)
-    assert late_evidence(clear, rate, sigma, clear)[1].size == pytest.approx(1e-2)
+    (said, item), take = late_evidence(clear, rate, sigma, clear)
+    assert (said.key, item.key, take.size) == ("encoder.late_taken", "encoder.late", pytest.approx(1e-2))
+    assert item.figures["late"] == clear.size  # what is left turns the body
     assert left_of(clear, None, 1.0) == clear.sigma
     assert left_of(NOT_LATE, None, 1e-3) == 1e-3
     assert left_of(NOT_LATE, Delay(0.0, 1e-5, 0.0), 1e-3) == 1e-5

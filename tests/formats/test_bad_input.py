@@ -357,3 +357,19 @@ def test_short_memory_is_not_called_a_damaged_file(tmp_path, monkeypatch, name):
         monkeypatch.setattr("pyarrow.parquet.ParquetFile", short)
     with pytest.raises(MemoryError):
         read_imu(path)
+
+
+MIXED = "time [s],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s],accel_x [{}],accel_y [{}],accel_z [{}]"
+
+
+@pytest.mark.parametrize("units", [("g", "m/s^2", "m/s^2"), ("mg", "mg", "g")])
+def test_headings_of_one_sensor_in_several_units_are_refused(tmp_path, units):
+    """A tenth of g among metres a second squared has the norm of gravity, and level was 43 sigmas off in silence."""
+    path = csv(tmp_path, [MIXED.format(*units), *ROWS])
+    says(path, "several units", f"accel_x [{units[0]}]", f"accel_z [{units[2]}]", "`units`")
+    assert read_imu(path, units={"accel": "m/s^2"}).accel[0, 2] == 9.8
+
+
+def test_one_unit_may_be_written_in_two_ways(tmp_path):
+    path = csv(tmp_path, [MIXED.format("m/s2", "m/s^2", "m/s^2"), *ROWS])
+    assert read_imu(path).accel[0, 2] == 9.8

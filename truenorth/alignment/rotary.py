@@ -29,7 +29,7 @@ from truenorth.alignment.encoder_angles import CarriedAngles, angles_at, carried
 from truenorth.alignment.encoder_turns import base_turns
 from truenorth.alignment.fine import ARM_PRIOR, CoarseStart, FineAlignment
 from truenorth.alignment.gyro_matrix import gyro_matrix_evidence
-from truenorth.alignment.late_encoder import NOT_LATE, late_effect, late_evidence, left_of
+from truenorth.alignment.late_encoder import NOT_LATE, coarse_delay, late_effect, late_evidence, left_of
 from truenorth.alignment.late_gyro import late_gyro_evidence
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT
@@ -150,7 +150,7 @@ def align_rotary(
     own = method if method in FADING else "swaying"
     tell(f"aligning: {own}")
     asked = _Asked(record, encoder, position, given, axes, lever_arm, angle_sigma, offset_sigma, latency_sigma, own)
-    taken = NOT_LATE
+    taken = NOT_LATE if encoder is None else coarse_delay(carried_angles(encoder, record, axes))
     for _ in range(AGAIN):
         answer, evidence, late = _aligned(asked, task, coarse, C_n0_i, taken)
         if late is None:

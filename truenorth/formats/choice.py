@@ -148,22 +148,33 @@ def _by_caller(columns: Columns, layout: Layout, named: dict[str, tuple[str, flo
     _once(columns, [name for name, _ in named.values()])
     choice = Choice(kind, (), [named[ours] for ours in COLUMNS[kind]])
     choice.documented = all(name == ours for ours, (name, _) in named.items())
-    choice.units = _units([heading_of(name) for name, _ in choice.sensors], kind)
+    choice.units = _units(columns, layout, [heading_of(name) for name, _ in choice.sensors], kind)
     given = {ours: f"{'-' if sign < 0.0 else ''}{name}" for ours, (name, sign) in named.items()}
     given |= {key: layout.columns[key] for key in ("time", "scale", "interval") if key in layout.columns}
     choice.guesses.append(Guess("columns", ", ".join(given.values()), "as the caller says", 1.0, {"columns": given}))
     return with_time(columns, layout, choice)
 
 
-def _units(headings: Sequence[Heading | None], kind: Kind) -> dict[str, str]:
-    """Units of a sensor that all of its headings agree on, and that fit the kind."""
+def _units(columns: Columns, layout: Layout, headings: Sequence[Heading | None], kind: Kind) -> dict[str, str]:
+    """Units of a sensor that all of its headings agree on, and that fit the kind.
+
+    Raises
+    ------
+    DataError
+        Its headings name units of several sizes, and the caller none: near gravity's size no number shows which axis is off.
+    """
     result = {}
     wanted = {"rates": ("angular_rate", "acceleration"), "increments": ("angle", "speed")}[kind]
     for sensor, part, dimension in zip(("gyro", "accel"), (headings[:3], headings[3:]), wanted):
-        said = {heading.unit if heading is not None else None for heading in part}
-        unit = said.pop()
-        if not said and unit is not None and parse_unit(unit)[1] == DIMENSIONS[dimension][0]:
-            result[sensor] = unit
+        said = [(heading.name, heading.unit) for heading in part if heading is not None and heading.unit is not None]
+        sizes = {parse_unit(unit) for _, unit in said}
+        if len(sizes) > 1 and sensor not in layout.units:
+            raise DataError(
+                f"{columns.path.name}: the headings of one sensor name several units: {listed([name for name, _ in said])}; "
+                "expected one for all three axes: correct the headings, or give the unit that holds for all (`units`)"
+            )
+        if len(sizes) == 1 and len(said) == len(part) and sizes.pop()[1] == DIMENSIONS[dimension][0]:
+            result[sensor] = said[0][1]
     return result
 
 
@@ -213,7 +224,7 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
             shown,
             (),
             [(name, -1.0 if down and k > 2 else 1.0) for k, name in enumerate(names)],
-            _units(headings, layout.kind or kind),
+            _units(columns, layout, headings, layout.kind or kind),
             guesses=[guess],
         )
     return None
