@@ -90,7 +90,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
         return start if alignment.moving is None else _with_sensors(start, alignment.moving.summary())
     joint = alignment.handover
     if joint is None:
-        joint = _by_static_limits(
+        joint = by_static_limits(
             alignment.C_nb,
             alignment.phi_covariance,
             alignment.phi_floor,
@@ -137,7 +137,7 @@ def _start(
     )
 
 
-def _by_static_limits(
+def by_static_limits(
     C_nb: Array,
     phi_covariance: Array,
     phi_floor: Array,
@@ -311,7 +311,7 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
             if "handover" in n:
                 joint = Handover(**{key: _finite(n["handover"][key]) for key in JOINT})
             else:
-                joint = _by_static_limits(**numbers, position=position, spec=spec)
+                joint = by_static_limits(**numbers, position=position, spec=spec)
             time, duration = float(s["time_s"]), float(s["duration_s"])
             start = _start(time, gyro_bias, joint, position, spec, disturbance, duration)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
