@@ -8,12 +8,14 @@ from typer.testing import CliRunner
 
 import truenorth as tn
 from truenorth.cli import app
-from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.attitude import euler_from_dcm, euler_jacobian, rotation_vector_from_dcm
 from truenorth.formats import write_imu
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
 from truenorth.simulation.course import course
-from truenorth.simulation.manoeuvres import accelerate, straight
+from truenorth.simulation.manoeuvres import accelerate, straight, turn
+from truenorth.state.mounting import Mounting
+from truenorth.state.track import Track
 
 PLACE = tn.Position.from_degrees(48.0, 11.0, 500.0)
 HEADING = math.radians(123.0)
@@ -159,3 +161,48 @@ def test_on_the_command_line(poor, tmp_path):
         code, said = run("navigate", log, *arguments)
         assert code == 2
         assert words in said
+
+
+@pytest.mark.parametrize("pitch", [-0.2, 0.05])
+def test_a_base_at_rest_does_not_show_a_heading_that_was_given(pitch):
+    """Tilt and accelerometer bias cancel each other, and what a tilt turns about the vertical went with the tilt: .22 of sigma."""
+    log = simulate(rest(PLACE, HEADING, pitch, 0.1), rate=20.0, duration=120.0, imu="consumer", seed=3).record
+    start = tn.known_start(log.between(None, 60.0), PLACE, "consumer", HEADING, SIGMA)
+    J = euler_jacobian(start.C_nb)[0]
+    scale = SIGMA * np.sqrt(np.diag(start.P))
+    np.testing.assert_allclose(J @ start.P[:3, 12:] / scale[12:], 0.0, atol=1e-3)
+    assert J @ start.P[:3, :3] @ J == pytest.approx(SIGMA**2, rel=1e-6)
+    free = tn.navigate(log, start, imu="consumer").euler_sigma[:, 0]
+    stands = tn.navigate(log, start, imu="consumer", zupt=[(61.0, 119.0)]).euler_sigma[:, 0]
+    assert stands[0] == pytest.approx(SIGMA, rel=1e-3)
+    assert stands.min() > 0.99 * SIGMA
+    assert stands[-1] < free[-1]  # its gyros' bias shows
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_phone_that_stands_and_sets_off(smooth):
+    """Its accelerometers' bias is a tilt of some degrees. Heading was up to 15 sigmas off, smoothed vertical velocity up to 9."""
+    spec, squares = imu_spec("consumer"), []
+    for run in range(24):
+        rng = np.random.default_rng([4, run])
+        legs = straight(45.0)
+        for angle in rng.choice([-90.0, 90.0], 3):
+            legs += [*accelerate(9.0, 1.5, 0.0), *turn(np.radians(angle), np.radians(15.0)), *accelerate(0.0, 1.5, 9.0)]
+        motion = course(PLACE, legs, heading=rng.uniform(-3.0, 3.0))
+        made = simulate(motion, rate=50.0, duration=110.0, imu=spec, seed=8, run=run)
+        time = np.arange(0.5, 109.5)
+        s = motion.states(time)
+        noise = rng.standard_normal((2, len(time), 3))
+        lat = s.lat + noise[0, :, 1] / 6.37e6
+        lon = s.lon + noise[0, :, 0] / (6.37e6 * math.cos(PLACE.lat))
+        sigmas = {"position_sigma": np.ones((len(time), 3)), "velocity_sigma": np.full((len(time), 3), 0.05)}
+        fixes = tn.GnssRecord(time, lat, lon, s.alt + noise[0, :, 2], s.v_n + 0.05 * noise[1], **sigmas)
+        heading = float(euler_from_dcm(motion.states(0.0).C_nb)[0]) + SIGMA * rng.standard_normal()
+        start = tn.known_start(made.record, PLACE, spec, heading, SIGMA)
+        answer = tn.navigate(made.record, start, imu=spec, aid=tn.Gnss(fixes, Mounting()), smooth=smooth)
+        assert answer.status == "navigated"
+        errors = answer.track.errors_against(Track.along(motion.states(answer.time))) / answer.track.sigma[:, :9]
+        assert np.abs(errors[:, :6]).max() < 4.6
+        squares.append(np.mean(errors**2, axis=0))
+    assert np.sqrt(np.mean(squares, axis=0)[:6]).max() < 1.35  # 48 tilts: .999 of such means lie below 1.32
