@@ -26,6 +26,7 @@ from truenorth.state.now import NOW_NORTH, NOW_OTHER_RATE, NOW_RATE, NOW_RATE_NO
 from truenorth.strapdown.wander import displace
 
 _PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
+MOST_TURNED = 0.1**2  # rad^2: beyond it the second order is not the last
 GRAVITY_GRADIENT = 2.0 * earth.GRAVITY_EQUATOR / earth.SEMI_MAJOR  # 1/s^2: of the free vertical channel
 
 
@@ -73,6 +74,29 @@ def swing_as_gyros_say(axes: int, assumed: Any, now: Any, quick: Any, H: Any, z:
     for i in range(3):
         for j in range(3):
             R[i] += now[NOW_RATE_NOISE] * H[i, _BG + j] * H[i, _BG + j]
+
+
+@borrowing(forceinline=True)
+def arm_turned(at: int, C: Any, w: Any, R: Any) -> None:
+    """What an arm that is not known, turned by an attitude that is not known, adds to the variances of a place, m^2.
+
+    ``phi x C dl`` is of the second order: of .1 rad and 1 m a decimetre, which fixes of centimetres take for knowledge of either.
+    Its mean square is in the noise, the two taken as independent (A. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970,
+    sec. 9.3, filters of second order). Where heading is open passes about narrow guesses find it, and this is left out.
+    """
+    if at < 0 or w.H[2, _DP + 2] == 0.0 or w.P[_PHI + 2, _PHI + 2] > MOST_TURNED:
+        return  # no such arm, no place
+    d = (0.0, 0.0, 0.0)  # variances of the arm along the level frame
+    for i in range(3):
+        for k in range(3):
+            d = (
+                d[0] + C[0, i] * w.P[at + i, at + k] * C[0, k],
+                d[1] + C[1, i] * w.P[at + i, at + k] * C[1, k],
+                d[2] + C[2, i] * w.P[at + i, at + k] * C[2, k],
+            )
+    east, north, up = w.P[_PHI, _PHI], w.P[_PHI + 1, _PHI + 1], w.P[_PHI + 2, _PHI + 2]
+    level = max(north * d[2] + up * d[1], east * d[2] + up * d[0])  # whichever way a level frame points
+    R[0], R[1], R[2] = R[0] + level, R[1] + level, R[2] + east * d[1] + north * d[0]
 
 
 @borrowing(forceinline=True)

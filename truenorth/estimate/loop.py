@@ -16,12 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.row import AT_LAG
+from truenorth.aiding.row import AT_ARM, AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
 from truenorth.estimate import along_curve
 from truenorth.estimate.apart import innovations_there, is_exact
 from truenorth.estimate.correct import (
+    arm_turned,
     damp_height,
     feed_back,
     joint_nis,
@@ -107,6 +108,7 @@ def correct(
     for a in range(3):
         R[a] = events.variance[k, a]
     measure(m, model, sources, source, events.measured[k], now, w, R)
+    arm_turned(sources.states[source, AT_ARM], m.sums.C_now, w, R)
     if sources.action[source] == PLACE:
         if not np.isnan(w.z[0]):
             set_place(size, m, now, R, w)
