@@ -16,6 +16,7 @@ from truenorth.alignment.swaying import SwayAlignment
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION
+from truenorth.errors.matrices import MATRICES
 from truenorth.errors.staying import BIASES, STATES, StaticModel
 from truenorth.errors.sway import rest_trend, sway_trend
 from truenorth.estimate.ongoing import Ongoing, block_limits
@@ -47,8 +48,9 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
     integrals = fine.integrals
     sways = isinstance(fine, SwayAlignment)
     rest = None if sways else rest_trend(integrals, fine.C_n0_i, task.position.lat)
+    sensors = STATES + MATRICES if len(fine.taken) >= STATES + MATRICES else STATES  # of an IMU that was turned: more
     # The arm of a sway of less than a minute is left behind: rows that follow show it as motion of the base.
-    kept = np.arange(fine.system.states if sways else STATES)
+    kept = np.arange(fine.system.states if sways else sensors)
     if isinstance(fine, SwayAlignment) and fine.slow_arm is not None:
         kept = np.delete(kept, fine.slow_arm)  # what is slow in a heading shows itself afterwards only
     return Ongoing(
@@ -58,8 +60,9 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         form=fine.form,
         C_n0_i=fine.C_n0_i,
         bias=fine.taken[BIASES],
+        matrices=fine.taken[STATES:sensors] if sensors > STATES else None,
         R=fine.disturbance**2,
-        arm=fine.arm - fine.end[STATES : STATES + 3] if isinstance(fine, SwayAlignment) else None,
+        arm=fine.taken[sensors : sensors + 3] if sways else None,
         motion=fine.motion if isinstance(fine, SwayAlignment) else (),
         trend=(sway_trend(integrals.C_mean), sway_trend(integrals.C_late)) if sways else rest,
         epochs=len(integrals.intervals),
