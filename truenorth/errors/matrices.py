@@ -102,6 +102,11 @@ def without_errors(record: ImuRecord, bias: Array, gyro_matrix: Array, accel_mat
     return replace(record, gyro=gyro, accel=accel, kind="increments")
 
 
+def by_matrix(x: Array) -> Array:
+    """(3, 9) ``M x`` by the nine elements of M, by rows."""
+    return np.asarray(np.kron(np.eye(3), x), dtype=np.float64)
+
+
 def matrices_of(x: Array) -> tuple[Array, Array]:
     """``M_g``, ``M_a`` (3, 3) of 18 states."""
     return x[:9].reshape(3, 3), x[9:].reshape(3, 3)
