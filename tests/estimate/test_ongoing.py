@@ -9,11 +9,11 @@ from truenorth.alignment import align
 from truenorth.core.position import Position
 from truenorth.errors.staying import QUIETEST_BASE, StaticModel
 from truenorth.errors.sway import about_rest, with_motion
-from truenorth.estimate.ongoing import CONTEXT
+from truenorth.estimate.ongoing import BLOCK, CONTEXT
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import FilterState, kalman
 from truenorth.records.specs import imu_spec
-from truenorth.simulation import rest, simulate
+from truenorth.simulation import Sway, Tone, rest, simulate
 
 PLACE = Position.from_degrees(45.0, 10.0)
 SPEC = imu_spec("navigation")
@@ -70,6 +70,69 @@ def test_it_is_the_filter_of_the_whole_log_about_the_same_nominal_solution(recor
     x, sigma = found.x[-1], np.sqrt(np.diag(found.P[-1]))
     assert np.max(np.abs(went_on.x - x)[:12] / sigma[:12]) < tolerance
     np.testing.assert_allclose(np.diag(went_on.P)[:12], sigma[:12] ** 2, rtol=tolerance)
+
+
+@pytest.fixture(scope="module")
+def sheering():
+    """A ship that sheers at anchor: turned so far that scale factors and misalignments of her gyros are states as well."""
+    ship = Sway(
+        PLACE,
+        heading=0.7,
+        heading_tones=(Tone(0.3, 100.0),),
+        pitch_tones=(Tone(0.01, 6.0),),
+        roll_tones=(Tone(0.03, 9.0),),
+        lever_arm=(1.0, 5.0, 2.0),
+    )
+    return simulate(ship, rate=50.0, duration=200.0, imu=imu_spec("tactical"), seed=3).record
+
+
+@pytest.mark.parametrize("method", ["swaying", "kalman"])
+@pytest.mark.parametrize("kind", ["increments", "rates"])
+def test_errors_of_a_turned_imu_go_on_as_in_the_filter_of_the_whole_log(sheering, method, kind):
+    scale = 1.0 if kind == "increments" else 1.0 / sheering.interval
+    record = replace(sheering, gyro=scale * sheering.gyro, accel=scale * sheering.accel, kind=kind)
+    spec = imu_spec("tactical")
+    end = align(record.between(None, FIRST), PLACE, spec, method=method).ongoing
+    assert end.matrices is not None
+    # Whatever the rows show of motion: their noise is that of the log.
+    end = replace(end, largest=np.full(2, np.inf))
+    went_on = after(end, record)
+    sways = end.arm is not None
+    prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=end.arm, arm_sigma=30.0 if sways else 0.0)
+    taken = np.concatenate([np.zeros(6), end.bias, end.matrices, *([end.arm] if sways else [])])
+    part = record.between(None, went_on.time + 0.5 * record.interval)
+    log = StayingLog(
+        part, end.C_n0_i, PLACE, StaticModel.of(spec), prior, end.interval, sways=sways, form=end.form, taken=taken
+    )
+    slow = log.integrals
+    if end.trend is not None:
+        t = -1.0 + 2.0 * np.arange(len(slow.C_mean)) / (end.fitted - 1)
+        mean, late = (np.stack([np.ones_like(t), t], axis=1) @ line for line in end.trend)
+        slow = replace(slow, C_mean=mean.reshape(-1, 3, 3), C_late=late.reshape(-1, 3, 3))
+    system = log._system(slow)
+    if sways:
+        system = with_motion(system, end.interval, end.motion)
+    else:
+        system = replace(system, R=system.R + np.diag(end.R - QUIETEST_BASE**2))
+    later = {name: getattr(system, name)[end.epochs :] for name in ("Phi", "Q", "H", "R", "S", "z")}
+    found = kalman(replace(system, **later), FilterState(end.x, end.P, np.zeros(()), np.zeros(0)))
+    assert went_on.epochs == len(system.z) > end.epochs
+    x, sigma = found.x[-1], np.sqrt(np.diag(found.P[-1]))
+    assert np.max(np.abs(went_on.x - x)[:30] / sigma[:30]) < 1e-3
+    np.testing.assert_allclose(np.diag(went_on.P)[:30], sigma[:30] ** 2, rtol=1e-3)
+
+
+def test_between_epochs_of_a_turned_imu_attitude_is_as_unsure_as_its_turn_leaves_it(sheering):
+    end = align(sheering.between(None, FIRST), PLACE, "tactical", method="swaying").ongoing
+    first = int(np.searchsorted(sheering.time, end.time + 0.5 * sheering.interval))
+    count = round(BLOCK * end.interval / sheering.interval)
+    known = rows(sheering, first - CONTEXT, first + count)
+    silent = after(end, rows(sheering, 0, first + count + 2), measured=False)
+    assert silent.time == pytest.approx(known.time[-1], abs=1e-6)
+    (_, C_nb, P), (_, there, wanted) = end.attitude(known, CONTEXT), silent.attitude(None, 0)
+    np.testing.assert_allclose(C_nb, there, atol=1e-7)
+    # Between epochs biases act by the attitude as it is, in the filter by its slow part.
+    np.testing.assert_allclose(np.diag(P), np.diag(wanted), rtol=0.02)
 
 
 def test_a_tilt_within_the_log_goes_no_further(record):

@@ -7,13 +7,14 @@ import pytest
 
 from tests.runs import some
 from truenorth.alignment import align
+from truenorth.core.attitude import euler_from_dcm
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.live import Aligner
 from truenorth.live.intake import CONFIRMED, Intake
 from truenorth.live.log import Log
 from truenorth.records.specs import imu_spec
-from truenorth.simulation import rest, simulate
+from truenorth.simulation import Sway, Tone, rest, simulate
 from truenorth.strapdown.increments import increments
 
 PLACE = Position.from_degrees(45.0, 10.0)
@@ -69,6 +70,28 @@ def test_between_solutions_the_filter_goes_on_as_the_batch_does(record):
     assert np.all(np.abs(off) < 3.0 * answer.sigma)
     assert np.abs(off[1:]).max() < np.radians(0.01)
     assert answer.sigma[0] == pytest.approx(whole.euler_sigma[0], rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_ship_that_sheers_at_anchor_is_answered_between_solutions():
+    """She turns so far that scale factors and misalignments of her gyros are states: the filter goes on with them."""
+    tones = {"pitch_tones": (Tone(0.01, 6.0),), "roll_tones": (Tone(0.03, 9.0),), "heading_tones": (Tone(0.3, 100.0),)}
+    motion = Sway(PLACE, heading=0.7, lever_arm=(1.0, 5.0, 2.0), **tones)
+    record = simulate(motion, rate=25.0, duration=200.0, imu=imu_spec("tactical"), seed=3).record
+    answers = []
+    with Aligner(PLACE, "tactical", kind=record.kind, background=False) as aligner:
+        for first in range(0, len(record), 50):
+            pushed(aligner, record[first : first + 50], 50)
+            answers += [] if aligner.answer is None else [aligner.answer]
+    going = [a for a in answers if a.solution.method == "swaying"]
+    assert all(a.solution.ongoing.matrices is not None for a in going)
+    assert max(a.time - a.solution.time for a in going) > 13.0  # a block of the filter
+    true = motion.states(np.array([a.time for a in going])).C_nb
+    off = np.array([a.euler for a in going]) - np.stack(euler_from_dcm(true), axis=1)
+    off[:, 0] = (off[:, 0] + np.pi) % (2.0 * np.pi) - np.pi
+    assert np.abs(off / [a.sigma for a in going]).max() < 4.0
+    for answer in going:
+        assert answer.sigma == pytest.approx(answer.solution.euler_sigma, rel=0.2)
 
 
 def test_after_a_gap_that_nobody_fills_the_answer_is_gone_until_the_next_solution(record):

@@ -1,5 +1,6 @@
 """A velocity log alone, live: what its curve makes of the place is summed as the rows come, and goes on from a saved run."""
 
+import json
 import math
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import truenorth as tn
 from truenorth.live import Navigator
 from truenorth.live.feeds import VelocityFeed
+from truenorth.live.outputs import json_line
 from truenorth.navigation import Start
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import simulate
@@ -59,3 +61,10 @@ def test_what_has_come_counts_once_whoever_asks_and_in_a_run_that_was_saved(ship
     np.testing.assert_allclose(end.sigma[-1, 6:8], answer.motion.position_sigma[:2], rtol=0.05)
     # Heading is known to some 17 deg: 720 m of way may have led aside by that.
     assert end.sigma[-1, 6:8].max() > 100.0
+
+
+def test_where_height_is_held_nobody_knows_the_vertical_velocity(ship):
+    answer = fed(run_of(ship[1]), ship, 200, until=30.0).answer
+    assert np.isnan(answer.motion.v_sigma).tolist() == [False, False, True]
+    said = json.loads(json_line(answer))
+    assert said["v_n_sigma_m_s"] == [*answer.motion.v_sigma[:2], None]

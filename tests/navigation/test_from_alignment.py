@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.runs import some
 from truenorth.alignment import align
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
@@ -12,7 +13,7 @@ from truenorth.navigation import navigate
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.records.specs import imu_spec
 from truenorth.results import save
-from truenorth.simulation import ideal_log, rest, simulate
+from truenorth.simulation import Sway, Tone, ideal_log, rest, simulate
 from truenorth.state.layout import BA, BG, PHI
 
 PLACE = Position.from_degrees(40.0, 116.0, 50.0, horizontal_sigma=1e-3, vertical_sigma=1e-3)
@@ -77,3 +78,23 @@ def test_free_inertial_after_an_alignment_is_as_good_as_its_sigma():
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(np.square(sigmas), axis=0))
     print("RMS over sigma, position east north, velocity east north:", ratio)
     assert np.all((ratio > 0.8) & (ratio < 1.2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", some([8], [9, 3]))
+def test_what_scale_factors_make_of_gravity_is_handed_on_as_a_bias(seed):
+    """A base that sheers has them among its states: velocities were up to 12 sigmas off after a minute."""
+    place, rng = Position.from_degrees(20.0, 10.0), np.random.default_rng(seed)
+    heading, *phases = rng.uniform(0.0, 6.0, 4)
+    tones = [
+        (Tone(size, period, phase),)
+        for size, period, phase in zip((0.3, 0.01, 0.03), (100.0, 6.0, 9.0), phases, strict=True)
+    ]
+    motion = Sway(place, heading, heading_tones=tones[0], pitch_tones=tones[1], roll_tones=tones[2])
+    record = simulate(motion, rate=25.0, duration=560.0, imu="navigation", seed=seed).record
+    found = align(record.between(None, 500.0), place, "navigation")
+    assert found.status == "aligned"
+    assert len(found.ongoing.x) == 57  # they are states
+    result = navigate(record, found, altitude="free")
+    off = (result.v_n[-1] - motion.states(result.time[-1]).v_n) / result.v_sigma[-1]
+    assert np.abs(off).max() < 3.0

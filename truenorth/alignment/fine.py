@@ -19,7 +19,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector, length_of, quatern
 from truenorth.core.compiled import compiled
 from truenorth.core.position import Position
 from truenorth.errors.arm import SLOWEST_SEA
-from truenorth.errors.matrices import matrices_of, without_errors
+from truenorth.errors.matrices import MATRICES, by_matrix, matrices_of, without_errors
 from truenorth.errors.staying import (
     BA,
     BG,
@@ -132,9 +132,25 @@ class FineAlignment(Filtered):
         C_n0_b = dcm_from_rotation_vector(J @ self.end) @ self.C_n0_i @ C_ib
         return C_n0_b, J @ self.P @ J.T + self._walked(time), J @ self.floor @ J.T
 
-    def joint_at(self, time: float) -> Array:
-        """(9, 9) covariance of misalignment (``n0``), gyro and accelerometer bias (body axes) at any time of the log."""
-        J = self._carried_to(time)
+    @property
+    def accel_matrix(self) -> slice:
+        """States of the accelerometers' scale factors and misalignments, by rows; none but of an IMU that was turned."""
+        turned = len(self.taken) >= STATES + MATRICES
+        return slice(STATES + MATRICES // 2, STATES + MATRICES) if turned else slice(STATES, STATES)
+
+    def joint_at(self, time: float, force: Array) -> Array:
+        """(9, 9) covariance of misalignment (``n0``), gyro bias and what acts as accelerometer bias at any time of the log.
+
+        Parameters
+        ----------
+        time : float, s
+            Since the beginning of the first row's interval.
+        force : (3,) array, m/s^2
+            Body axes: at it scale factors and misalignments act as a bias, where they are states.
+        """
+        J = self._carried_to(time).copy()
+        if (own := self.accel_matrix).start < own.stop:
+            J[6:9, own] += by_matrix(force)
         P = J @ self.P @ J.T
         P[PHI, PHI] += self._walked(time)
         return np.asarray(P)

@@ -47,7 +47,7 @@ from truenorth.alignment.windowed import response
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.attitude import misalignment
 from truenorth.core.errors import DataError
-from truenorth.errors.matrices import with_matrices
+from truenorth.errors.matrices import known_moments, with_matrices
 from truenorth.errors.staying import PHI
 from truenorth.quality.tilt import PIECE, whole_cells
 from truenorth.records import ImuRecord
@@ -206,7 +206,8 @@ def _response(fine: SwayAlignment, imu: ImuSpec | None = None, size: float = np.
         One sigma of each entry.
     """
     log, base = fine.about, fine.estimator.base
-    bigger = with_matrices(base, log.right_record, log.integrals, log.C_n0_i, log.position.lat)
+    moments = known_moments(log.right_record, log.integrals)
+    bigger = with_matrices(base, moments, log.integrals, log.C_n0_i, log.position.lat)
     causes = response(bigger)[0][:, :, base.states :]
     if imu is None:
         causes = causes[:, :, :9]

@@ -32,28 +32,22 @@ Moments = tuple[list[Array], list[Array]]
 
 def with_matrices(
     system: LinearSystem,
-    record: Callable[[], ImuRecord],
+    moments: Moments,
     integrals: InertialIntegrals,
     C_n0_i: Array,
     lat: float,
-    moments: Moments | None = None,
 ) -> LinearSystem:
     """A system of :meth:`truenorth.errors.staying.StaticModel.linearise` with the matrices of both sensors as 18 more states.
 
     Parameters
     ----------
-    record : callable
-        Gives the record as integrated: nominal errors taken off. It is asked for once for the same integrals.
+    moments : Moments
+        By which the matrices act.
     integrals : InertialIntegrals
-        Of that record.
     C_n0_i : (3, 3) array
     lat : float, rad
-    moments : Moments, optional
-        By which the matrices act (:func:`smooth_moments`); those of the record when left out.
     """
     T = integrals.intervals[:, None, None]
-    if moments is None:
-        moments = _about(integrals)["moments"] = _about(integrals).get("moments") or _moments(record(), integrals)
     gyro, accel = moments
     C_n_n0 = local_axes(integrals.time, lat)
     force = system.Phi[:, DV, PHI] / T  # [f x], f the reaction to gravity
@@ -108,9 +102,22 @@ def without_errors(record: ImuRecord, bias: Array, gyro_matrix: Array, accel_mat
     return replace(record, gyro=gyro, accel=accel, kind="increments")
 
 
+def by_matrix(x: Array) -> Array:
+    """(3, 9) ``M x`` by the nine elements of M, by rows."""
+    return np.asarray(np.kron(np.eye(3), x), dtype=np.float64)
+
+
 def matrices_of(x: Array) -> tuple[Array, Array]:
     """``M_g``, ``M_a`` (3, 3) of 18 states."""
     return x[:9].reshape(3, 3), x[9:].reshape(3, 3)
+
+
+def known_moments(record: Callable[[], ImuRecord], integrals: InertialIntegrals) -> Moments:
+    """:func:`moments_of` a record as integrated, nominal errors taken off; it is asked for once for the same integrals."""
+    about = _about(integrals)
+    if "moments" not in about:
+        about["moments"] = moments_of(record(), integrals)
+    return about["moments"]
 
 
 @remembered
@@ -119,15 +126,29 @@ def _about(integrals: InertialIntegrals) -> dict[str, Moments]:
     return {}
 
 
-def _moments(record: ImuRecord, integrals: InertialIntegrals) -> Moments:
-    """``int s^m C_ib e_i w_j ds`` of each interval for m = 0, 1, 2, and the same of the force; (K, 3, i, j) each."""
-    dtheta, dvel = increments(record)
-    steps = record.steps
+def moments_of(
+    record: ImuRecord, integrals: InertialIntegrals, context: int = 0, before: Array | None = None
+) -> Moments:
+    """``int s^m C_ib e_i w_j ds`` of each interval for m = 0, 1, 2, and the same of the force; (K, 3, i, j) each.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    integrals : InertialIntegrals
+        Of it; attitude and time begin with them.
+    context : int
+        Rows at its beginning that are before them.
+    before : (3, 3) array, optional
+        ``C_ib`` at their beginning; none where left out.
+    """
+    dtheta, dvel = (values[context:] for values in increments(record))
+    steps = record.steps[context:]
     edges = np.concatenate(([0.0], np.cumsum(steps)))
     ends = np.searchsorted(edges, integrals.time - 0.5 * record.interval)
     last = int(ends[-1])
     C_after, _, _ = inertial_integrals(dtheta[:last], dvel[:last], steps[:last], np.arange(last + 1))
     C = 0.5 * (C_after[:-1] + C_after[1:])
+    C = C if before is None else before @ C
     rows = np.diff(ends)
     row, longest = np.repeat(np.arange(len(rows)), rows), int(rows.max())
     s = ((edges[:last] + edges[1 : last + 1]) / 2 - integrals.time[row])[:, None]

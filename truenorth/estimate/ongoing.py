@@ -5,6 +5,9 @@ about it and filtered. The state after some more rows is that of the batch's own
 solution. Only a new batch finds the motion anew. A base that moves more, or otherwise, than in the log would make the filter too
 sure. So rows are filtered in blocks of ten intervals, and a block is filtered again, with as much noise as it shows, when its
 innovations are larger, or more of one sign, than chance makes them and than those of any ten intervals of the log.
+
+Of an IMU that was turned the batch has found scale factors and misalignments, too: they are taken off the rows that come as they
+were of its own, and stay among the states.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
 from truenorth.errors.arm import arm_rows, with_arm
+from truenorth.errors.matrices import MATRICES, Moments, matrices_of, moments_of, with_matrices, without_errors
 from truenorth.errors.staying import BG, PHI, QUIETEST_BASE, STATES, Form, StaticModel
 from truenorth.errors.sway import AxisMotion, about_rest, with_motion
 from truenorth.estimate.staying import core_system
@@ -46,6 +50,9 @@ class Ongoing:
     form: Form
     C_n0_i: Array  # (3, 3): nominal attitude; the states are errors of it
     bias: Array  # (6,): gyro and accelerometer bias that are taken off
+    matrices: (
+        Array | None
+    )  # (18,): scale factors and misalignments that are, where they are states, behind the first twelve
     R: Array  # (3,) (m/s)^2: variance of the base's own velocity, east, north, up
     arm: Array | None  # (3,) m: nominal lever arm, where it is a state
     motion: tuple[AxisMotion, ...]  # of the base, where it is a state; else empty
@@ -101,13 +108,14 @@ class Ongoing:
         covariance : (3, 3) array, rad^2
             Of the misalignment, east, north, up.
         """
-        elapsed, C_ib, J = self.elapsed, self.C_ib, np.hstack([np.eye(3), np.zeros((3, 3))])
+        gyros = slice(STATES, STATES + (0 if self.matrices is None else MATRICES // 2))
+        states = np.r_[PHI, BG, gyros]
+        elapsed, C_ib, J = self.elapsed, self.C_ib, np.eye(3, len(states))
         if record is not None and len(record) > context:
-            turn, total = _turned(record, context, self.bias)
+            turn, acting = _turned(*self._right(record), context)
             elapsed = float(record.time[-1]) - self.start
-            J[:, 3:] = -self.C_n0_i @ C_ib @ total
+            J[:, 3:] = -self.C_n0_i @ C_ib @ acting[:, : len(states) - 3]
             C_ib = C_ib @ turn
-        states = np.r_[PHI, BG]
         P = J @ self.P[np.ix_(states, states)] @ J.T
         P += self.noise.gyro_random_walk**2 * (elapsed - self.elapsed) * np.eye(3)
         C_n_n0 = earth_rotation(elapsed, self.position.lat).T
@@ -118,7 +126,8 @@ class Ongoing:
         """Go on over `count` blocks; over fewer, at least one, where the base moves more in one of them than in the log."""
         end = self.time + count * BLOCK * self.interval + 0.5 * record.interval
         part = _rows(record, slice(int(np.searchsorted(record.time, end))))
-        found = integrate(part, self.interval, self.bias[:3], self.bias[3:], context=context)
+        part, bias = self._right(part)
+        found = integrate(part, self.interval, bias[:3], bias[3:], context=context)
         C, T = self.C_ib, found.time[:, None]
         whole = InertialIntegrals(
             start=self.start,
@@ -130,7 +139,8 @@ class Ongoing:
             C_late=C @ found.C_late,
             C_ib_at=found.C_ib_at,
         )
-        system = self._linearise(whole)
+        moments = None if self.matrices is None else moments_of(part, found, context, C)
+        system = self._linearise(whole, moments)
         if not measured:
             system = system.with_arrays(z=np.full_like(system.z, np.nan))
         state = FilterState(self.x, self.P, np.zeros(()), np.zeros(0))
@@ -154,7 +164,13 @@ class Ongoing:
             disturbed=self.disturbed + disturbed,
         )
 
-    def _linearise(self, integrals: InertialIntegrals) -> LinearSystem:
+    def _right(self, record: ImuRecord) -> tuple[ImuRecord, Array]:
+        """The record without scale factors and misalignments, and the biases (6,) that it still has."""
+        if self.matrices is None:
+            return record, self.bias
+        return without_errors(record, self.bias, *matrices_of(self.matrices)), np.zeros(6)
+
+    def _linearise(self, integrals: InertialIntegrals, moments: Moments | None) -> LinearSystem:
         place, slow = self.position, integrals
         if self.trend is not None:
             t = -1.0 + 2.0 * (self.epochs + np.arange(len(integrals.C_mean))) / (self.fitted - 1)
@@ -170,6 +186,8 @@ class Ongoing:
                 slow = replace(integrals, C_mean=mean.reshape(-1, 3, 3), C_late=late.reshape(-1, 3, 3))
         P0 = np.zeros((STATES, STATES))
         system = core_system(self.noise, slow, integrals, self.C_n0_i, place, P0, self.form)
+        if moments is not None:
+            system = with_matrices(system, moments, integrals, self.C_n0_i, place.lat)
         if self.arm is not None:
             system = with_arm(system, arm_rows(integrals, self.C_n0_i, place.lat), self.arm)
         if self.motion:
@@ -203,13 +221,20 @@ def _disturbance(estimates: Estimates) -> Array:
     return np.diag(np.maximum(ratio - 1.0, 0.0) * expected.mean(axis=0))
 
 
-def _turned(record: ImuRecord, context: int, bias: Array) -> tuple[Array, Array]:
-    """Attitude after the last row in the body axes before the first, (3, 3), and its integral, s."""
+def _turned(record: ImuRecord, bias: Array, context: int) -> tuple[Array, Array]:
+    """Attitude after the last row in the body axes before the first, (3, 3), and by what the gyros' errors act until then.
+
+    Of biases that is the integral of the attitude, s; of scale factors and misalignments, by rows, that of its product with each
+    angular rate: (3, 12).
+    """
     dtheta, dvel = increments(record)
     steps = record.steps
     points = np.unique(np.linspace(context, len(record), STEPS).astype(np.int64))
     C, _, _ = inertial_integrals(dtheta, dvel, steps, points, bias[:3], bias[3:])
     C = C[0].T @ C
     edges = np.concatenate([[0.0], np.cumsum(steps)])[points]
-    total = np.einsum("k,kij->ij", 0.5 * np.diff(edges), C[1:] + C[:-1])
-    return C[-1], total
+    angle = np.concatenate([np.zeros((1, 3)), np.cumsum(dtheta, axis=0)])[points]
+    half = 0.5 * (C[1:] + C[:-1])
+    by_bias = np.einsum("k,kij->ij", np.diff(edges), half)
+    by_rate = np.einsum("kai,kj->aij", half, np.diff(angle, axis=0))
+    return C[-1], np.hstack([by_bias, by_rate.reshape(3, 9)])

@@ -20,7 +20,15 @@ from truenorth.core.position import Position
 from truenorth.core.remembered import remembered
 from truenorth.errors.arm import arm_rows, slow_arm_rows, with_arm
 from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
-from truenorth.errors.matrices import MATRICES, Moments, matrices_of, smooth_moments, with_matrices, without_errors
+from truenorth.errors.matrices import (
+    MATRICES,
+    Moments,
+    known_moments,
+    matrices_of,
+    smooth_moments,
+    with_matrices,
+    without_errors,
+)
 from truenorth.errors.staying import (
     BG,
     BIASES,
@@ -264,7 +272,8 @@ class StayingLog:
             self.noise, slow, self.integrals, self.C_n0_i, self.position, P0[:STATES, :STATES], self.form
         )
         if "matrices" in groups:
-            system = with_matrices(system, self.right_record, self.integrals, self.C_n0_i, lat, moments)
+            moments = moments or known_moments(self.right_record, self.integrals)
+            system = with_matrices(system, moments, self.integrals, self.C_n0_i, lat)
             self._turns = system.Phi[:, PHI, groups["matrices"]]
         if "arm" in groups:
             rows = arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,8 @@ from truenorth.state.layout import DP, DV
 
 Array = NDArray[np.float64]
 
+NOTHING = 1e-9  # m/s: a zero that was turned from axes into others
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -28,7 +31,7 @@ class Motion:
     position : (3,) array
         Latitude, longitude (rad), height (m).
     v_sigma, position_sigma : (3,) arrays, m/s and m
-        One sigma, east, north, up.
+        One sigma, east, north, up. NaN of a vertical velocity that nothing shows: where height is held it is taken for zero.
     """
 
     v_n: Array
@@ -41,8 +44,14 @@ class Motion:
         """At the epoch of an alignment on the move."""
         state = found.moving or found.transfer
         assert state is not None
-        at, sigma = found.position, np.sqrt(np.diag(state.P))
-        return cls(state.v_n, np.array([at.lat, at.lon, at.alt]), sigma[DV], sigma[DP])
+        at = found.position
+        return cls.known(state.v_n, np.array([at.lat, at.lon, at.alt]), np.sqrt(np.diag(state.P)))
+
+    @classmethod
+    def known(cls, v_n: Array, position: Array, sigma: Array) -> Motion:
+        """With the sigmas of a filter's states, whose vertical velocity has none where height is held."""
+        v_sigma = np.where(sigma[DV] > NOTHING, sigma[DV], np.nan)
+        return cls(v_n, position, v_sigma, sigma[DP].copy())
 
     def summary(self) -> dict[str, Any]:
         """The part of :meth:`Answer.summary`."""
@@ -52,7 +61,7 @@ class Motion:
             "alt_m": float(self.position[2]),
             "position_sigma_m": self.position_sigma.tolist(),
             "v_n_m_s": self.v_n.tolist(),
-            "v_n_sigma_m_s": self.v_sigma.tolist(),
+            "v_n_sigma_m_s": [sigma if math.isfinite(sigma) else None for sigma in self.v_sigma.tolist()],
         }
 
 

@@ -25,6 +25,7 @@ from truenorth.live.log import Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.siblings import Siblings
+from truenorth.navigation.first_row import carried_to
 from truenorth.navigation.given import fed_back
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude
@@ -202,6 +203,11 @@ class Loop:
         self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
         setting = self.setting(feeds)
         time = float(rows[0, 0]) - self._interval
+        start = carried_to(
+            self.start, np.append(time, rows[0, 1:]), self._interval, increments=self.kind == "increments"
+        )
+        if start is not self.start:
+            self.start, self.siblings, self._last = start, Siblings(start), np.full(7, time)
         self._state = begin(setting, self.start, time, self._interval)
         if feeds:  # else errors grow as the start says
             self.siblings.begin(setting, time, self._interval)

@@ -41,7 +41,6 @@ from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import Late
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note
-from truenorth.state.layout import DP, DV
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Residuals, Track
@@ -181,7 +180,6 @@ class Navigator:
             return None
         result = self._judged(*found)
         track = result.track
-        sigma = track.sigma[-1]
         return Answer(
             time=float(track.time[-1]),
             C_nb=track.C_nb[-1],
@@ -191,7 +189,7 @@ class Navigator:
             reasons=self._reasons(result),
             solution=self.solution,
             counts=self.intake.counts,
-            motion=Motion(track.v_n[-1], track.position[-1], sigma[DV].copy(), sigma[DP].copy()),
+            motion=Motion.known(track.v_n[-1], track.position[-1], track.sigma[-1]),
         )
 
     @property

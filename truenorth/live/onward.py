@@ -101,7 +101,8 @@ class Onward:
         if under_way(found):
             self.carry = self.earlier = self.mover = None
             if found.heading_known:
-                self.mover = self.navigator(found, feeds)
+                # A master's solution knows the vertical motion, which goes on: held height would say that there is none.
+                self.mover = self.navigator(found, feeds, altitude=None if found.transfer is None else "free")
         elif self.earlier is None or self.carry is None or self.carry.elapsed > SETTLED:
             self.earlier = self.carry
         if not under_way(found) and not turned:

@@ -93,7 +93,7 @@ def view(aligner: Aligner | Navigator, answer: Answer | None, goal: float, note:
             table.add_row(
                 "place", f"{lat:.6f}, {lon:.6f} deg, {m.position[2]:.1f} m ± {significant(m.position_sigma.max())} m"
             )
-            table.add_row("speed", f"{np.linalg.norm(m.v_n):.2f} m/s ± {significant(m.v_sigma.max())} m/s")
+            table.add_row("speed", f"{np.linalg.norm(m.v_n):.2f} m/s ± {significant(np.nanmax(m.v_sigma))} m/s")
         if answer.status != "navigated":
             table.add_row("floor", f"{angle(answer.floor[0])}: what waiting does not improve")
         table.add_row("verdict", f"[{colour}]{answer.status}[/]; {waiting(answer, goal)}")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.alignment.rest_shift import shift_evidence
-from truenorth.core.errors import DataError, UsageError
+from truenorth.core.errors import UsageError
 from truenorth.errors.axes import axis_sigma
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
@@ -33,6 +33,7 @@ from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.arm import filtered_by_possible_arm, looser_track
 from truenorth.navigation.by_start import start_evidence
 from truenorth.navigation.curve import with_curve
+from truenorth.navigation.first_row import from_start
 from truenorth.navigation.given import (
     arm_as_begun,
     by_key,
@@ -209,7 +210,7 @@ def _by_specification(
     given = by_key(aid)
     begin, spec, imu_source = start_of(start, imu)
     check_start(begin)
-    record = _from_start(corrected(log := as_sampled(record), spec, calibration), begin)
+    record, begin = from_start(corrected(log := as_sampled(record), spec, calibration), begin)
     check_start_at_rest(begin, record)
     record, gaps, disturbances = bridge_gaps(record)
     noise = seen_in(with_rounding(spec, log, aided=bool(given) and damping is None), record)
@@ -379,16 +380,3 @@ def _intervals(
     if not (interval > 0.0 and output > 0.0):
         raise UsageError(f"interval {interval:g} s, output {output:g} s; expected both above zero")
     return interval, max(1, round(output / interval))
-
-
-def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
-    """The rows after the start's epoch."""
-    begin = record.time[0] - record.interval
-    slack = 0.5 * record.interval
-    if not begin - slack <= start.time < record.time[-1] - record.interval:
-        raise DataError(
-            f"{record.source}: runs from {begin:.3f} s to {record.time[-1]:.3f} s, but the alignment holds at {start.time:.3f} "
-            "s; expected a log that holds the alignment's epoch and goes on from it, on the same clock"
-        )
-    first = int(np.searchsorted(record.time, start.time + slack))
-    return record[first:]

@@ -87,7 +87,9 @@ def start_from_alignment(alignment: Alignment) -> Start:
             moving.known,
             moving.force,
         )
-        return start if alignment.moving is None else _with_sensors(start, alignment.moving.summary())
+        if alignment.moving is None:
+            return replace(start, within=True)
+        return _with_sensors(start, alignment.moving.summary())
     joint = alignment.handover
     if joint is None:
         joint = by_static_limits(
@@ -305,7 +307,8 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
             known = {str(name): _finite(values) for name, values in n.get("known", {}).items()}
             force = _finite(n.get("force", standing()))
             begin = float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec, known, force
-            start = _with_sensors(moving_start(*begin), s)
+            within = s["method"].startswith("transfer")
+            start = replace(_with_sensors(moving_start(*begin), s), within=within)
         else:
             gyro_bias = numbers.pop("gyro_bias")
             if "handover" in n:

@@ -72,6 +72,8 @@ class Start(State):
         (:mod:`truenorth.errors.axes`): they stand behind the fifteen in P, in this order.
     force : (3,) array, m/s^2
         Specific force at rest, body axes: known axes of the accelerometers act on what differs from it. Zeros where none are known.
+    within : bool
+        Whether the epoch may lie within a row of the IMU, as that of a transfer does.
     """
 
     P: Array
@@ -83,6 +85,7 @@ class Start(State):
     plumb: float = 0.0
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=lambda: np.zeros(3))
+    within: bool = False
 
     @classmethod
     def of(cls, state: State, P: Array) -> Start:

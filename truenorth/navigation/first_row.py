@@ -1,0 +1,80 @@
+"""The rows that navigation takes, and the start as it is where the first of them begins.
+
+A transfer holds at the last row of its master, which falls anywhere within a row of the IMU. That row was taken whole: by up to
+its length the turn was taken twice. Ships that roll by 5 deg, 50 rows a second, were so tilted by 2 arcmin, and their velocity
+4 to 10 sigmas off a quarter of a minute later. So the start is carried to the beginning of the row, by what the row says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import earth_rate_n, gravity_n, radii, transport_rate_n
+from truenorth.core.errors import DataError
+from truenorth.records import ImuRecord
+from truenorth.state.state import Start
+
+Array = NDArray[np.float64]
+
+
+def from_start(record: ImuRecord, start: Start) -> tuple[ImuRecord, Start]:
+    """The rows after the start's epoch, and the start where they begin.
+
+    Raises
+    ------
+    DataError
+        The log does not hold the epoch, or does not go on from it.
+    """
+    begin = record.time[0] - record.interval
+    slack = 0.5 * record.interval
+    if not begin - slack <= start.time < record.time[-1] - record.interval:
+        raise DataError(
+            f"{record.source}: runs from {begin:.3f} s to {record.time[-1]:.3f} s, but the alignment holds at {start.time:.3f} "
+            "s; expected a log that holds the alignment's epoch and goes on from it, on the same clock"
+        )
+    first = int(np.searchsorted(record.time, start.time + slack))
+    part = record[first:]
+    edge = float(part.time[0]) - part.interval
+    holding = max(first - 1, 0) if edge > start.time else first  # the row that the epoch lies in
+    row = np.concatenate([[edge], record.gyro[holding], record.accel[holding]])
+    return part, carried_to(start, row, part.interval, increments=record.kind == "increments")
+
+
+def carried_to(start: Start, row: Array, interval: float, *, increments: bool) -> Start:
+    """A start that lies within a row, at an end of that row; any other as it is.
+
+    Parameters
+    ----------
+    start : Start
+    row : (7,) array
+        The end's time, and the row's gyros and accelerometers.
+    interval : float, s
+    increments : bool
+        Whether these are increments, or rates.
+    """
+    dt = float(row[0]) - start.time
+    if not start.within or abs(dt) > interval:
+        return start
+    values = row[1:] / interval if increments else row[1:]
+    w, f = values[:3] - start.gyro_bias, values[3:] - start.accel_bias
+    earth, along = earth_rate_n(start.lat), transport_rate_n(start.lat, start.alt, start.v_n)
+    half, whole = (
+        dcm_from_rotation_vector(-part * (earth + along)) @ start.C_nb @ dcm_from_rotation_vector(part * w)
+        for part in (0.5 * dt, dt)
+    )
+    gained = dt * (half @ f + gravity_n(start.lat, start.alt) - np.cross(2.0 * earth + along, start.v_n))
+    east, north, up = dt * (start.v_n + 0.5 * gained)
+    R_M, R_N = radii(start.lat)
+    return replace(
+        start,
+        time=float(row[0]),
+        C_nb=whole,
+        v_n=start.v_n + gained,
+        lat=start.lat + north / (R_M + start.alt),
+        lon=start.lon + east / ((R_N + start.alt) * np.cos(start.lat)),
+        alt=start.alt + up,
+    )
