@@ -11,6 +11,7 @@ from tests.runs import some
 from truenorth.alignment import align
 from truenorth.alignment.turning import sway_walks
 from truenorth.campaign.fault_benches import BENCHES, misses
+from truenorth.core.attitude import misalignment
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
@@ -52,6 +53,58 @@ def test_an_accelerometer_that_steps_is_said_and_counts(seed: int) -> None:
         assert any(item.key == "bias.accel_steps_level" for item in answer.evidence) == fault
         if answer.status == "level_only":
             assert np.max(np.abs(misses(answer, truth)["level"])) < 4.0
+
+
+def _buoy(run: int, amplitude: float, period: float):
+    """A buoy whose heading swings slowly, its place and its attitude at the end."""
+    rng = np.random.default_rng([7, run])
+
+    def tone(size: float, shortest: float, longest: float):
+        lasts, begins = rng.uniform(shortest, longest), rng.uniform(0.0, 360.0)
+        return [{"amplitude": f"{size} deg", "period": f"{lasts:.4f} s", "phase": f"{begins:.2f} deg"}]
+
+    heading = f"{rng.uniform(0.0, 360.0):.2f} deg"
+    rocking = {"roll": tone(2.0, 4.0, 8.0), "pitch": tone(1.0, 3.0, 6.0)}
+    tones = rocking | {"heading": tone(amplitude, 0.8 * period, 1.2 * period)}
+    scenario = {
+        "name": "buoy",
+        "duration": "120 s",
+        "rate": "50 Hz",
+        "position": {"lat": "45 deg", "lon": "10 deg"},
+        "imu": "industrial",
+        "motion": {"kind": "sway", "heading": heading, "tones": tones},
+        "lever_arm": ["0 m", "0 m", "1 m"],
+    }
+    simulation = read_scenario(scenario).simulate(seed=5, run=run)
+    return simulation.record, Position.from_degrees(45.0, 10.0), simulation.truth.C_nb[-1]
+
+
+@pytest.mark.parametrize("runs", some([2], [12]))
+@pytest.mark.parametrize(("amplitude", "period"), [(30.0, 150.0), (50.0, 200.0)])
+def test_a_heading_that_swings_slowly_shows_biases_and_no_step(runs: int, amplitude: float, period: float) -> None:
+    """Biases acted by the mean heading: of 20 logs each 8 and 12 showed accelerometers that step, 2 and 5 were refused for it."""
+    z = []
+    for run in range(runs):
+        record, place, C_nb = _buoy(run, amplitude, period)
+        answer = align(record, place, "industrial")
+        assert answer.status == "level_only", answer.reasons
+        sigma = np.sqrt(np.diag(answer.phi_covariance)[:2])
+        assert np.all(sigma < np.radians(0.35))  # the bias of the accelerometers alone is .46 deg
+        z.append(misalignment(answer.C_nb, C_nb)[:2] / sigma)
+    assert np.max(np.abs(z)) < 4.0
+    assert runs < 10 or 0.7 < np.sqrt(np.mean(np.square(z))) < 1.35
+
+
+@pytest.mark.parametrize("run", some([0], [1, 2, 3]))
+def test_a_step_on_a_heading_that_swings_is_not_silent(run: int) -> None:
+    """By 30 mg after 70 s: refused, or within sigma."""
+    record, place, C_nb = _buoy(run, 50.0, 200.0)
+    step = np.array([0.0, 0.3, 0.0]) * (record.time > 70.0)[:, None] * record.interval
+    answer = align(replace(record, accel=record.accel + step), place, "industrial")
+    assert any(item.key == "bias.accel_steps_level" for item in answer.evidence)
+    if answer.status == "level_only":
+        z = misalignment(answer.C_nb, C_nb)[:2] / np.sqrt(np.diag(answer.phi_covariance)[:2])
+        assert np.max(np.abs(z)) < 4.0
 
 
 @pytest.mark.parametrize("duration", some([150.0], [240.0]))

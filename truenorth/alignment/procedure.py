@@ -41,6 +41,7 @@ from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
 from truenorth.alignment.swung_bias import swung_biases
 from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
 from truenorth.alignment.turning import (
+    coloured_level,
     infer_turning,
     rocks_all_along,
     strays,
@@ -242,7 +243,7 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     used, where = (infer_turning(task), INFERRED) if spec is None else (spec, f"specification {spec.name!r}")
     fine = turning_align(task, used, np.array([task.epoch.row]))
     answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
-    apart = fine.scatter * np.eye(3)
+    apart = (fine.scatter + coloured_level(fine, used, task.gravity)) * np.eye(3)
     answer = replace(
         answer,
         phi_covariance=without_heading(answer.phi_covariance + apart),

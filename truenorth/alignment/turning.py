@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.check import BLIND_RATE, LogCheck, force_size
 from truenorth.alignment.fine import ARM_PRIOR, MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import infer_spec
+from truenorth.alignment.matched import innovations_of
 from truenorth.alignment.swaying import farthest
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.alignment.usual import usual
@@ -28,7 +29,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE, gravity_of_place
 from truenorth.core.position import Position
 from truenorth.errors.staying import PHI, StaticModel, mean_velocity
-from truenorth.estimate.base_motion import VelocityNoise, white_variance
+from truenorth.estimate.base_motion import COLOUR_ALARM, COLOUR_BLOCK, COLOUR_RUNS, VelocityNoise, white_variance
 from truenorth.estimate.batch import CONVERGED, Filtered, Settled, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
@@ -183,12 +184,24 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
         Rows after which the integrated attitude is wanted.
     """
     record, lat, alt = task.record, task.position.lat, task.position.alt
-    rate = EARTH_RATE * math.cos(lat)  # one sigma of (0, 1) - (sin h, cos h) is about as large
+    rate = EARTH_RATE * math.cos(lat)
     sways = task.motion.overall == "swaying" or rocks_all_along(task.motion)
     arm = ARM_PRIOR if sways else TURN_ARM
-    prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=arm, level_rate=rate)
+    slow_arm = (
+        ARM_PRIOR if sways else 0.0
+    )  # a boat at anchor swings about another point than the one about which waves roll her
+    prior = prior_of(
+        np.diag(spec.bias_variance),
+        spec=spec,
+        arm=np.zeros(3),
+        arm_sigma=arm,
+        slow_arm_sigma=slow_arm,
+        level_rate=rate * math.sqrt(0.5),
+    )
+    # Of any heading h: it is (sin h, cos h) less the (0, 1) of the convention.
+    prior.mean[prior.groups["rate"]] = 0.0, -rate
     begin = record.time[0] - record.interval
-    C, taken = level_of(record.between(None, begin + LEVELLED).accel.mean(axis=0)), prior.mean
+    C, taken = level_of(record.between(None, begin + LEVELLED).accel.mean(axis=0)), np.zeros(len(prior.mean))
     length = FIRST
     while True:
         whole = length >= record.duration
@@ -306,6 +319,25 @@ class _Passes:
         away = np.sum((np.array(self.ups) - best.up) ** 2, axis=1)
         left = best.found.end[LEVEL]
         return 0.5 * float(weight @ away / weight.sum() + left @ left)
+
+
+def coloured_level(fine: TurningAlignment, spec: ImuSpec, gravity: float) -> float:
+    """Variance by which slow motion of a base that swings makes level worse than its filter says, of an axis, rad^2.
+
+    A boat that sails to and fro on her anchor goes metres in some ten seconds, in step with her heading: no white noise of velocity
+    is like that, and the biases that turn with heading come out too well, by as much as innovations that follow each other add up
+    to more than they should over `COLOUR_BLOCK`. Waves are faster than that. The biases of accelerometers in full are the most: so
+    much is level worse where heading is not used at all.
+    """
+    white = innovations_of(fine).white[:, LEVEL, 0]
+    alike = np.mean(white[1:] * white[:-1], axis=0) / np.maximum(np.mean(white**2, axis=0), 1e-300)
+    blocks = len(white) // COLOUR_BLOCK
+    if blocks < COLOUR_RUNS or np.max(alike) < COLOUR_ALARM / math.sqrt(len(white)):
+        return 0.0
+    sums = np.sum(white[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, -1), axis=1)
+    more = max(float(np.max(np.mean(sums**2, axis=0))) / COLOUR_BLOCK - 1.0, 0.0)
+    known = float(np.max(np.diag(fine.P)[LEVEL]))
+    return min(more * known, float(np.max(spec.bias_variance[3:5])) / gravity**2)
 
 
 def strays(fine: FineAlignment, position: Position, walk: float) -> float:

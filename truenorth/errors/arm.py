@@ -49,16 +49,20 @@ def slow_arm_rows(integrals: InertialIntegrals, C_n0_i: Array, lat: float, C_sb:
         As of :func:`arm_rows`.
     """
     C_ib = integrals.C_ib if C_sb is None else integrals.C_ib @ C_sb
-    t = integrals.time
-    C_nb = np.swapaxes(earth_rotation(t, lat), 1, 2) @ C_n0_i @ C_ib
-    heading = np.unwrap(np.arctan2(C_nb[:, 0, 1], C_nb[:, 1, 1]))
-    part = (t - t[0]) / (t[-1] - t[0])
-    count = math.ceil(2.0 * (t[-1] - t[0]) / SLOWEST_SEA)
-    basis = np.column_stack([part**k for k in range(4)] + [np.cos(np.pi * np.outer(part, np.arange(1, count)))])
-    slow = basis @ np.linalg.lstsq(basis, heading, rcond=None)[0]
+    slow = slow_heading(C_ib, integrals.time, C_n0_i, lat)
     c, s, zero = np.cos(slow), np.sin(slow), np.zeros_like(slow)
     place = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1), np.stack([zero, zero], axis=1)], axis=1)
     return np.asarray(np.diff(place, axis=0) / integrals.intervals[:, None, None])
+
+
+def slow_heading(C_ib: Array, time: Array, C_n0_i: Array, lat: float) -> Array:
+    """(K,) what is slower than the sea in the heading of attitudes (K, 3, 3) at times, rad: clockwise, as headings go."""
+    C_nb = np.swapaxes(earth_rotation(time, lat), 1, 2) @ C_n0_i @ C_ib
+    heading = np.unwrap(np.arctan2(C_nb[:, 0, 1], C_nb[:, 1, 1]))
+    part = (time - time[0]) / (time[-1] - time[0])
+    count = math.ceil(2.0 * (time[-1] - time[0]) / SLOWEST_SEA)
+    basis = np.column_stack([part**k for k in range(4)] + [np.cos(np.pi * np.outer(part, np.arange(1, count)))])
+    return np.asarray(basis @ np.linalg.lstsq(basis, heading, rcond=None)[0])
 
 
 def with_arm(system: LinearSystem, rows: Array, arm: Array) -> LinearSystem:

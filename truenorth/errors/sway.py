@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
+from truenorth.errors.arm import slow_heading
 from truenorth.errors.staying import QUIETEST_BASE, grown, local_axes
 from truenorth.filters import LinearSystem
 from truenorth.strapdown.inertial import InertialIntegrals
@@ -41,6 +42,9 @@ SMALL = 16  # states of a compiled filter that is there, too, where the motion h
 GOES_ROUND = 1.0
 # rad, RMS about its line, by which a base that rests shakes at the most: one that is tilted by more shows its sensors' biases.
 SHAKES = 0.01
+
+# rad, by which a heading swings at least that shows biases: what they make of less is as small as surge in step with it.
+SWINGS = math.radians(10.0)
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half a period: exact to rounding
 
@@ -234,9 +238,7 @@ def with_motion(
     return system.with_made(**bigger, R=system.R + np.diag(white**2 - QUIETEST_BASE**2))
 
 
-def without_sway(
-    integrals: InertialIntegrals, C_sb: Array | None = None, *, straight: bool = False
-) -> InertialIntegrals:
+def without_sway(integrals: InertialIntegrals, C_sb: Array | None = None) -> InertialIntegrals:
     """The integrals with the base's sway averaged out of the attitude by which biases act; an indexer's turning stays.
 
     A bias seen from a base that sways makes a velocity of the sway's own periods, tenths of a mm/s of 100 ug. So do scale
@@ -251,8 +253,6 @@ def without_sway(
     integrals : InertialIntegrals
     C_sb : (K+1, 3, 3) array, optional
         Attitude of the base in the IMU at the integrals' times; the two are one when left out.
-    straight : bool
-        Whether the base has no slow turn either: where gyros know it so badly that a turn of theirs would show the biases.
     """
     turned = None if C_sb is None else _half_way(C_sb)
     basis = _line(len(integrals.C_mean))
@@ -263,11 +263,35 @@ def without_sway(
         about = (basis @ trend).reshape(-1, 3, 3)
         if np.mean(np.sum((base - about) ** 2, axis=(1, 2))) > GOES_ROUND:
             return C
-        trend[1] *= not straight
-        mean = (basis @ trend).reshape(-1, 3, 3)
-        return mean if turned is None else mean @ np.swapaxes(turned, 1, 2)
+        return about if turned is None else about @ np.swapaxes(turned, 1, 2)
 
     return replace(integrals, C_mean=slow(integrals.C_mean), C_late=slow(integrals.C_late))
+
+
+def without_rocking(integrals: InertialIntegrals, C_n0_i: Array, lat: float) -> InertialIntegrals:
+    """The integrals of a base whose heading swings slowly, and whose rocking is averaged out of the attitude by which biases act.
+
+    Of gyros that do not see the earth turn. What is slower than the sea in heading stays, as they show it: biases turn with it, and
+    a pass by their mean attitude left innovations that followed each other, of boats that swing by 30 deg in 150 s, and some looked
+    like accelerometers that step. A heading that goes round and round is followed, too.
+
+    Parameters
+    ----------
+    integrals : InertialIntegrals
+    C_n0_i : (3, 3) array
+        Attitude at the start.
+    lat : float, rad
+    """
+    middle = (integrals.time[1:] + integrals.time[:-1]) / 2
+    slow = slow_heading(integrals.C_mean, middle, C_n0_i, lat)
+    slow *= float(np.ptp(slow)) > SWINGS
+    turn = dcm_from_rotation_vector(slow[:, None] * [0.0, 0.0, -1.0])
+    back = np.swapaxes(turn, 1, 2) @ local_axes(integrals.time, lat) @ C_n0_i
+    mean, late = ((turn @ np.mean(back @ C, axis=0)) for C in (integrals.C_mean, integrals.C_late))
+    off = np.swapaxes(turn, 1, 2) @ mean - back @ integrals.C_mean
+    if np.mean(np.sum(off**2, axis=(1, 2))) > GOES_ROUND:
+        return integrals
+    return about_rest(integrals, (mean, late), C_n0_i, lat)
 
 
 def without_shaking(integrals: InertialIntegrals, C_n0_i: Array, lat: float) -> InertialIntegrals:

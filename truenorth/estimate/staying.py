@@ -40,7 +40,7 @@ from truenorth.errors.staying import (
     force_system,
     measured_at_rest,
 )
-from truenorth.errors.sway import without_shaking, without_sway
+from truenorth.errors.sway import without_rocking, without_shaking, without_sway
 from truenorth.estimate.cells import cell_of, system_of_cell
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
@@ -241,9 +241,9 @@ class StayingLog:
             if cell is not None:
                 return self._of_cell(cell)
         if self.sways:
-            # Gyros that do not see the earth turn know no slow turn about the vertical.
-            blind = "rate" in self.prior.groups
-            return self._system(without_sway(self.integrals, self.C_sb, straight=blind))
+            if "rate" in self.prior.groups:  # of gyros that do not see the earth turn
+                return self._system(without_rocking(self.integrals, self.C_n0_i, self.position.lat))
+            return self._system(without_sway(self.integrals, self.C_sb))
         if self.prior.groups:
             return self._system(self.integrals)
         return self._system(without_shaking(self.integrals, self.C_n0_i, self.position.lat))
