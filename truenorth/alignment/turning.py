@@ -187,9 +187,8 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
     rate = EARTH_RATE * math.cos(lat)
     sways = task.motion.overall == "swaying" or rocks_all_along(task.motion)
     arm = ARM_PRIOR if sways else TURN_ARM
-    slow_arm = (
-        ARM_PRIOR if sways else 0.0
-    )  # a boat at anchor swings about another point than the one about which waves roll her
+    # A boat at anchor swings about another point than the one about which waves roll her.
+    slow_arm = ARM_PRIOR if sways else 0.0
     prior = prior_of(
         np.diag(spec.bias_variance),
         spec=spec,

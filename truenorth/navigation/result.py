@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from truenorth.records import Trajectory
 
 Array = NDArray[np.float64]
-Status = Literal["navigated", "inconsistent"]
+Status = Literal["navigated", "not_converged", "inconsistent"]
 Altitude = Literal["fixed", "free", "baro", "gnss"]
 
 
@@ -44,7 +44,7 @@ class Navigation(Shown):
     Attributes
     ----------
     status : str
-        ``navigated``, or ``inconsistent``: the measurements contradict the model.
+        ``navigated``; ``not_converged``: level is not known at the end; ``inconsistent``: the measurements contradict the model.
     evidence : tuple of Evidence
         What decided the status first, with figures and with what it does to the answer.
     track : Track
@@ -306,7 +306,7 @@ def judged_navigation(result: Navigation, evidence: Sequence[Evidence], least: A
     """
     claim = last_sigma(result.track)
     verdict = judge(Claim(claim), evidence)
-    status: Status = verdict.status("navigated")  # type: ignore[assignment]  # navigated or inconsistent
+    status: Status = verdict.status("navigated")  # type: ignore[assignment]  # heading has no limit here
     if status != "inconsistent" and (verdict.added != NO_EFFECT or least is not None):
         growth = np.ones(result.track.P.shape[:2]) if least is None else _with_others(least, result.track)
         if verdict.added != NO_EFFECT:
