@@ -179,6 +179,15 @@ def test_a_base_at_rest_does_not_show_a_heading_that_was_given(pitch):
     assert stands[-1] < free[-1]  # its gyros' bias shows
 
 
+def test_another_heading_takes_the_place_of_the_first(poor):
+    """Of an alignment that has levelled only, and knows of no heading of its own."""
+    level = tn.align(poor.record, PLACE, "consumer")
+    once = tn.with_heading(level, HEADING, SIGMA)
+    again = tn.with_heading(tn.with_heading(level, HEADING + 0.2, SIGMA), HEADING, SIGMA)
+    np.testing.assert_allclose(again.C_nb, once.C_nb, atol=1e-12)
+    np.testing.assert_allclose(again.phi_covariance, once.phi_covariance, rtol=0.02, atol=1e-9)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("smooth", [False, True])
 def test_a_phone_that_stands_and_sets_off(smooth):

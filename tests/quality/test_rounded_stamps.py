@@ -43,6 +43,20 @@ def test_a_lost_row_is_a_step_of_two():
     assert np.flatnonzero(even.steps > 1.5 / 400.0).tolist() == [700, 1899]
 
 
+def lossy(rate, every, seed=3):
+    """Even stamps of whole ticks, rows lost by chance."""
+    time = np.arange(8000) / rate
+    return np.delete(time, np.flatnonzero(np.random.default_rng(seed).random(8000) < 1.0 / every))
+
+
+@pytest.mark.parametrize("rate", [10.0, 100.0, 250.0, 1000.0])
+@pytest.mark.parametrize("every", [20, 300, 600, 2000])
+def test_rows_that_are_lost_are_no_rounding(rate, every):
+    """Steps of 10 ms among which some are 20: taken for rounded, the lost increments were spread over 200 rows, 42 sigmas."""
+    record = record_at(lossy(rate, every), 1.0 / rate)
+    assert at_even_steps(record) is record
+
+
 @pytest.mark.parametrize(
     "record",
     [

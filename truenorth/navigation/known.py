@@ -25,7 +25,7 @@ from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
 from truenorth.navigation.departure import UNSEEN_GAIN, Departure, departure
-from truenorth.navigation.start import by_static_limits, moving_start, start_from_alignment
+from truenorth.navigation.start import moving_start, start_from_alignment
 from truenorth.quality.held import as_sampled
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
 from truenorth.records import ImuRecord, MasterRecord
@@ -133,39 +133,28 @@ def _measured(alignment: Alignment, heading: float, sigma: float) -> Alignment:
 
 
 def _turned(alignment: Alignment, heading: float, sigma: float) -> Alignment:
-    """The level kept, turned about the vertical to the heading; the earth's level rate taken off the gyro bias.
-
-    A tilt turns the forward axis about the vertical, too, by its part along that axis times the tangent of pitch. So with the tilt
-    what is left about the vertical goes with the accelerometers' biases: else a filter that stands, and weighs a tilt against its
-    bias, seems to see its heading. Phones that set off with a pitch of 3 deg were up to 15 sigmas off.
-    """
+    """The level kept, turned about the vertical to the heading; the earth's level rate taken off the gyro bias."""
     C_nb = dcm_from_euler(heading, alignment.pitch, alignment.roll)
     turn = C_nb @ alignment.C_nb.T
     P, floor = (turn @ M @ turn.T for M in (alignment.phi_covariance, alignment.phi_floor))
     J = euler_jacobian(C_nb)[0]
     of_heading = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-J[0] / J[2], -J[1] / J[2], 1.0 / J[2]]])
     P[2], P[:, 2] = 0.0, 0.0
-    P[2, 2] = sigma**2  # of the level and of the heading, not yet of phi
-    floor = _lowered(floor, 0.0)
+    P[2, 2] = sigma**2
     gyro_bias, gyro_sigma = alignment.gyro_bias, alignment.gyro_bias_sigma
     if not alignment.heading_known and alignment.history is None and alignment.gyro_bias.any():  # the mean rate
         rate, level = EARTH_RATE * math.cos(alignment.position.lat), 1.0 - C_nb[2] ** 2
         gyro_bias = gyro_bias - rate * C_nb[1]  # north part of the earth's rate along each axis
         variance = gyro_sigma**2 - 0.5 * rate**2 * level + (rate * min(sigma, 1.0)) ** 2 * level
         gyro_sigma = np.sqrt(np.maximum(variance, 0.01 * gyro_sigma**2))
-    known = alignment.accel_bias, alignment.accel_bias_sigma, alignment.position, alignment.imu
-    joint = by_static_limits(C_nb, P, floor, gyro_sigma, *known)
-    of_phi = np.eye(len(joint.P))
-    of_phi[:3, :3] = of_heading
-    joint = replace(joint, P=of_phi @ joint.P @ of_phi.T)
     return replace(
         alignment,
         C_nb=C_nb,
-        phi_covariance=joint.P[:3, :3],
-        phi_floor=floor,
+        phi_covariance=of_heading @ P @ of_heading.T,  # of phi, from that of the level and the heading
+        phi_floor=_lowered(floor, 0.0),
         gyro_bias=gyro_bias,
         gyro_bias_sigma=gyro_sigma,
-        handover=joint,
+        handover=None,
     )
 
 

@@ -43,6 +43,7 @@ MOST = 10  # passes
 ENOUGH = 1.0  # of the misfit: less is no better fit
 WIDER = 3.0  # times what the log leaves of a start
 FARTHEST = math.sqrt(chi_square_limit(1e-3, STATES))  # sigmas of the prior, that a start may be off
+LONGEST = 900.0  # s of a log, that show its start: smoothing holds all of them in memory
 PARTS = (0.1, 0.25, 0.5)  # of the measurements
 TILT = math.radians(1.0)  # one sigma of a start's, beyond which its square counts
 ROUNDING = 1e-12  # of a correlation
@@ -65,11 +66,15 @@ def about_its_start(plan: Plan, given: Mapping[str, Aid]) -> Plan:
         part = replace(plan, record=plan.record.between(None, until), start=at, always=always[gated])
         return part.run(aiding[gated], smooth=not gated)
 
+    def begun(at: Start, gated: bool, until: float | None) -> Track:
+        return run(at, gated, plan.start.time + LONGEST if until is None else until)
+
     start = recentred(run, plan.start, linear_within(given)) if aiding[True] else plan.start
     rows = [source.time for source in (*aiding[True], *plan.always) if source.does == "measurement"]
     tilted = float(np.sqrt(start.P[PHI, PHI].diagonal()[:2].max())) > TILT
-    if rows and len(start.P) == STATES and (tilted or not aiding[True]):
-        start = restarted(run, start, np.quantile(np.concatenate(rows), PARTS))
+    if any((t <= start.time + LONGEST).any() for t in rows) and len(start.P) == STATES and (tilted or not aiding[True]):
+        time = np.concatenate(rows)
+        start = restarted(begun, start, np.quantile(time[time <= start.time + LONGEST], PARTS))
     return plan if start is plan.start else replace(plan, start=start)
 
 

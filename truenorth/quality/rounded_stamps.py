@@ -3,7 +3,8 @@
 A rate is the same whatever its stamp says. An increment is an integral over a step, and by a step of 2 ms gravity is a quarter
 larger. Where all stamps are whole ticks and stay within a tick of an even clock that drifts slowly, the samples have that clock;
 written to the nearest tick they scatter about it by half a tick. Between lost rows each stretch has a clock of its own. Stamps that
-scatter by more are of a clock that is not even, and stay as they are.
+scatter by more are of a clock that is not even, and stay as they are. Of an even clock that is rounded the longer ones of two
+neighbouring steps come evenly, and lost rows by chance: steps of 10 ms among which some are 20 are no rounding.
 
 The rule is ours.
 """
@@ -29,7 +30,9 @@ WHOLE = 1e-3  # of a tick, by which a stamp may miss it; besides what a double o
 MISSING = 1.5  # steps, and a tick: in a longer one a row is missing
 HALF = 100  # rows to either side over which a clock is even
 SHORTEST = 10  # rows of a stretch that have a clock of their own
-WITHIN = 1.0  # ticks, by which stamps may be off an even clock
+WITHIN = 0.75  # ticks, by which stamps may be off an even clock; rounding makes half a tick
+FEWEST = 4  # longer steps, of which chance makes no even ones
+EVENLY = 0.9  # of the distances between them, that are nearly the same
 
 
 @remembered
@@ -85,7 +88,16 @@ def _tick(record: ImuRecord) -> float | None:
     for tick in TICKS:
         if tick < COARSE * record.interval:
             return None
-        count = steps / tick
-        if np.abs(count - np.round(count)).max() <= WHOLE + 2.0 * lost / tick:
-            return tick
+        count = np.round(steps / tick)
+        if np.abs(steps / tick - count).max() <= WHOLE + 2.0 * lost / tick:
+            return tick if _comes_evenly(count) else None
     return None
+
+
+def _comes_evenly(count: Array) -> bool:
+    """Whether of steps of whole ticks the longer of the two shortest comes evenly, as rounding makes it."""
+    apart = np.diff(np.flatnonzero(count == count.min() + 1.0))
+    if len(apart) < FEWEST:
+        return False
+    usual = float(np.median(apart))
+    return float(np.mean(np.abs(apart - usual) <= max(1.0, COARSE * usual))) >= EVENLY
