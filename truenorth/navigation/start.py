@@ -155,9 +155,10 @@ def _by_static_limits(
     their correlation navigation would seem far worse than it is. The biases' part of the misalignment's covariance (its
     floor) is given by the static limits; where the alignment got below them (a turning IMU), the correlation is less.
 
-    Where heading is given, and has no floor of its own, a tilt turns the forward axis about the vertical: by its part along that
-    axis times the tangent of pitch. That goes with the accelerometers' biases as the tilt does. Else a filter that stands, and weighs a
-    tilt against its bias, seems to see its heading: phones that set off with a pitch of 3 deg were up to 15 sigmas off.
+    Where heading is given, and has no floor of its own, a tilt turns the forward axis about the vertical: by its part along
+    that axis times the tangent of pitch. That goes with the accelerometers' biases as the tilt does. Else a filter that stands,
+    and weighs a tilt against its bias, seems to see its heading: phones that set off with a pitch of 3 deg were up to 15 sigmas
+    off.
     """
     g = float(normal_gravity(position.lat, position.alt))
     eps = np.diag(gyro_bias_sigma**2)
