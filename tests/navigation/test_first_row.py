@@ -51,3 +51,11 @@ def test_an_epoch_at_the_end_of_a_row_is_as_it_was():
     assert math.isclose(one[0], other[0])
     np.testing.assert_allclose(one[1], other[1], rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(one[2], other[2], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("rows", [0.0, 0.6, 1.0, 1.4])
+def test_a_start_in_the_last_rows_has_nothing_to_go_on_with(rows):
+    """It ended in a message about a record of one sample."""
+    record = simulate(SHIP, rate=50.0, duration=20.0, imu=SPEC).record
+    with pytest.raises(tn.DataError, match="goes on from it"):
+        tn.navigate(record, start_at(float(record.time[-1]) - rows * record.interval), imu=SPEC)

@@ -20,6 +20,8 @@ from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
 
+FEWEST = 2  # rows of a log that goes on
+
 
 def from_start(record: ImuRecord, start: Start) -> tuple[ImuRecord, Start]:
     """The rows after the start's epoch, and the start where they begin.
@@ -31,12 +33,12 @@ def from_start(record: ImuRecord, start: Start) -> tuple[ImuRecord, Start]:
     """
     begin = record.time[0] - record.interval
     slack = 0.5 * record.interval
-    if not begin - slack <= start.time < record.time[-1] - record.interval:
+    first = int(np.searchsorted(record.time, start.time + slack))
+    if not begin - slack <= start.time or len(record) - first < FEWEST:
         raise DataError(
             f"{record.source}: runs from {begin:.3f} s to {record.time[-1]:.3f} s, but the alignment holds at {start.time:.3f} "
             "s; expected a log that holds the alignment's epoch and goes on from it, on the same clock"
         )
-    first = int(np.searchsorted(record.time, start.time + slack))
     part = record[first:]
     edge = float(part.time[0]) - part.interval
     holding = max(first - 1, 0) if edge > start.time else first  # the row that the epoch lies in
