@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 import truenorth as tn
+from benchmarks.honesty.circling import received
 from truenorth.cli import app
 from truenorth.core.attitude import euler_from_dcm, euler_jacobian, rotation_vector_from_dcm
 from truenorth.formats import write_imu
@@ -14,7 +15,6 @@ from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, straight, turn
-from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
 PLACE = tn.Position.from_degrees(48.0, 11.0, 500.0)
@@ -200,16 +200,10 @@ def test_a_phone_that_stands_and_sets_off(smooth):
             legs += [*accelerate(9.0, 1.5, 0.0), *turn(np.radians(angle), np.radians(15.0)), *accelerate(0.0, 1.5, 9.0)]
         motion = course(PLACE, legs, heading=rng.uniform(-3.0, 3.0))
         made = simulate(motion, rate=50.0, duration=110.0, imu=spec, seed=8, run=run)
-        time = np.arange(0.5, 109.5)
-        s = motion.states(time)
-        noise = rng.standard_normal((2, len(time), 3))
-        lat = s.lat + noise[0, :, 1] / 6.37e6
-        lon = s.lon + noise[0, :, 0] / (6.37e6 * math.cos(PLACE.lat))
-        sigmas = {"position_sigma": np.ones((len(time), 3)), "velocity_sigma": np.full((len(time), 3), 0.05)}
-        fixes = tn.GnssRecord(time, lat, lon, s.alt + noise[0, :, 2], s.v_n + 0.05 * noise[1], **sigmas)
+        fixes = received(motion, 109.5, 1.0, rng)
         heading = float(euler_from_dcm(motion.states(0.0).C_nb)[0]) + SIGMA * rng.standard_normal()
         start = tn.known_start(made.record, PLACE, spec, heading, SIGMA)
-        answer = tn.navigate(made.record, start, imu=spec, aid=tn.Gnss(fixes, Mounting()), smooth=smooth)
+        answer = tn.navigate(made.record, start, imu=spec, aid=fixes, smooth=smooth)
         assert answer.status == "navigated"
         errors = answer.track.errors_against(Track.along(motion.states(answer.time))) / answer.track.sigma[:, :9]
         assert np.abs(errors[:, :6]).max() < 4.6

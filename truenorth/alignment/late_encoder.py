@@ -53,12 +53,11 @@ def coarse_delay(carried: CarriedAngles) -> Delay:
         left.append(float(np.sum((moved - np.median(moved, axis=1, keepdims=True)) ** 2)))
     best = int(np.argmin(left))
     size = TRIED * (best - most)
-    steps = (
-        2.0 * off[:, lag:].shape[1] * float(np.sum((ROUNDED * carried.steps) ** 2))
-    )  # of its resolution, whatever the delay
+    # What steps of its resolution leave, whatever the delay.
+    steps = 2.0 * (len(fine) - 2 * most - lag) * float(np.sum((ROUNDED * carried.steps) ** 2))
     if abs(size) <= SHORT or left[most] < SEEN * steps or left[best] - steps > EXPLAINED * (left[most] - steps):
         return NOT_LATE
-    return Delay(size, TRIED, math.sqrt(left[most] / max(left[best], 1e-300)))
+    return Delay(size, TRIED)
 
 
 def late_effect(carried: CarriedAngles, axes: Sequence[str], time: float, C_nb: Array) -> Effect:

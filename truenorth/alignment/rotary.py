@@ -150,9 +150,12 @@ def align_rotary(
     own = method if method in FADING else "swaying"
     tell(f"aligning: {own}")
     asked = _Asked(record, encoder, position, given, axes, lever_arm, angle_sigma, offset_sigma, latency_sigma, own)
-    taken = NOT_LATE if encoder is None else coarse_delay(carried_angles(encoder, record, axes))
+    carried = None if encoder is None else carried_angles(encoder, record, axes)
+    taken = NOT_LATE if carried is None else coarse_delay(carried)
     for _ in range(AGAIN):
-        answer, evidence, late = _aligned(asked, task, coarse, C_n0_i, taken)
+        if encoder is not None and taken.size:
+            carried = carried_angles(encoder, record, axes, taken.size)
+        answer, evidence, late = _aligned(asked, task, coarse, C_n0_i, carried, taken)
         if late is None:
             break
         taken = late
@@ -175,17 +178,15 @@ class _Asked(NamedTuple):
 
 
 def _aligned(
-    asked: _Asked, task: Task, coarse: InertialIntegrals, C_n0_i: Array, taken: Delay
+    asked: _Asked, task: Task, coarse: InertialIntegrals, C_n0_i: Array, carried: CarriedAngles | None, taken: Delay
 ) -> tuple[Alignment, list[Evidence], Delay | None]:
     """The answer by an encoder whose delay is taken off, what is seen, and the delay to take off instead, if any."""
     record, encoder, position, given, axes, lever_arm, angle_sigma, offset_sigma, latency_sigma, own = asked
     rows, biases, late = np.array([task.epoch.row]), None, None
-    if encoder is None:
+    if carried is None:
         mount = Mount(np.zeros(3), offset_sigma)  # along the IMU's axes
     else:
-        carried = carried_angles(encoder, record, axes, taken.size)
-        angles = angles_at(carried.record, coarse.start + coarse.time, axes)
-        C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
+        C_sb = np.swapaxes(C_bs_from_angles(axes, angles_at(carried.record, coarse.start + coarse.time, axes)), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb, offset_sigma)
         biases = partial(shown_biases, task, C_n0_i, C_sb)
     spec = infer_turning(task, biases) if given is None else given
@@ -199,13 +200,13 @@ def _aligned(
     source = "inferred from the noise of the log" if given is None else f"specification {spec.name!r}"
     answer = answer_of(task, fine, spec, source, P_bias, sways=True)
 
-    if encoder is None:
+    if carried is None:
         C_sb_at = _still_body(task, fine, axes)
         how = "angles from the gyros of a still body"
     else:
         C_sb_at = C_bs_from_angles(axes, angles_at(carried.record, [task.epoch.time], axes))[0].T
         angle_sigma = math.hypot(angle_sigma, carried.sigma(task.epoch.time))
-        how = f"angles of {len(axes)} axes from {encoder.source}"
+        how = f"angles of {len(axes)} axes from {carried.record.source}"
     if answer.history is not None and mount.C_sb is not None:
         answer = replace(answer, history=replace(answer.history, C_nb=answer.history.C_nb @ mount.C_sb[1:]))
     why = "the base may sway: its own motion is fitted to the log"
@@ -220,7 +221,7 @@ def _aligned(
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
     evidence = _of_encoder(start, encoder, axes, task, spec, taken.size)
-    if encoder is not None:
+    if carried is not None:
         seen, rest = _of_angles(fine, record, carried, axes, task, spec, angle_sigma)
         effect = late_effect(carried, axes, task.epoch.time, answer.C_nb)
         answer = grown(answer, effect.times(left_of(taken, rest, latency_sigma)))
@@ -288,8 +289,7 @@ def _of_encoder(
         return record_evidence(record, task.motion, imu=spec)
     gyro_bias = math.sqrt(float(spec.bias_variance[:3].max()))
     readings = {name: reading(encoder, axes, order, late) for name, order in orders(len(axes)).items()}
-    given = readings.pop("given")
-    found = encoder_evidence(record, given, readings, gyro_bias)
+    found = encoder_evidence(record, given := readings.pop("given"), readings, gyro_bias)
     found += record_evidence(record, task.motion, given, imu=spec, right=start.right_record())
     found += matrix_evidence(start, spec)
     found += codes_evidence(record, task.position.lat) + hum_evidence(record, task.position.lat, spec)

@@ -43,6 +43,7 @@ EDGE = 3  # seconds at either end of a stop, in which a vehicle may still roll, 
 INSIDE = 10  # seconds, further in, with which they are compared
 FEWEST_SECONDS = 3  # of a stop: of fewer nothing says whether their force is tilt or braking
 KNOWN = 3.0  # m/s, one sigma of the velocity of a free INS that says whether its vehicle moves
+BEYOND = 6.0  # of its sigmas, by which that is more than the speed of standing
 SPREAD = 0.25  # s before and after the middle of a second at rest, between which its row is drawn
 
 
@@ -335,7 +336,7 @@ def while_it_stands(updates: Sequence[Aiding], free: Track) -> list[Aiding]:
     """
     speed, sigma = np.linalg.norm(free.v_n[:, :2], axis=1), free.sigma[:, DV][:, :2].max(axis=1)
     known = np.logical_and.accumulate(sigma < KNOWN)
-    moves = known & (speed > STANDING + DIFFERS * sigma)
+    moves = known & (speed > STANDING + BEYOND * sigma)
     found = []
     for source in updates:
         at = np.clip(np.searchsorted(free.time, source.time), 0, len(free.time) - 1)
