@@ -138,6 +138,11 @@ def test_height_from_a_barometer_and_from_nothing(drive):
     assert abs(metres_off(held, motion)[2]) < 4 * held.position_sigma[-1, 2]
     assert np.ptp(fixed.position[:, 2]) == 0.0
     assert fixed.position_sigma[-1, 2] == pytest.approx(3.0)
+    # Its vertical velocity is taken for zero and measured by nobody: no sigma of it, where a zero would say that it is exact.
+    assert np.isnan(fixed.v_sigma[:, 2]).all()
+    assert fixed.summary()["v_n_sigma_m_s"] == [*fixed.v_sigma[-1, :2], None]
+    assert np.isfinite(fixed.v_sigma[:, :2]).all()
+    assert np.isfinite(free.v_sigma).all()
 
 
 def test_stops_are_found_where_the_car_stands_and_nowhere_else(drive):

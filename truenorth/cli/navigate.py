@@ -326,7 +326,7 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
     table.add_row(_("height"), f"{s['alt_m']:.2f} m", f"{sigma[2]:.2f} m")
     names = _("velocity east"), _("velocity north"), _("velocity up")
     for name, v, v_sigma in zip(names, s["v_n_m_s"], s["v_n_sigma_m_s"]):
-        table.add_row(name, f"{v:.3f} m/s", f"{v_sigma:.3f} m/s")
+        table.add_row(name, f"{v:.3f} m/s", "–" if v_sigma is None else f"{v_sigma:.3f} m/s")
     for name in ("heading", "pitch", "roll"):
         table.add_row(_(name), f"{s[f'{name}_deg']:.4f} deg", f"{s[f'{name}_sigma_deg']:.4f} deg")
     console.print(table)

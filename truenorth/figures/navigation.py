@@ -86,7 +86,7 @@ def _track(ax: Axes, result: Navigation) -> None:
 
 def _sigmas(ax: Axes, t: Array, sigma: Array, title: str, unit: str) -> None:
     for i, name in enumerate(("east", "north", "up")):
-        if np.median(sigma[:, i]) > HELD * np.median(sigma):  # a height that is held has a sigma of rounding
+        if np.median(sigma[:, i]) > HELD * np.nanmedian(sigma):  # a height that is held has a sigma of rounding
             trace(ax, t, sigma[:, i], color=COLOURS[i], label=name)
     ax.set_yscale("log")
     ax.set_title(title)

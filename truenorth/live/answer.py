@@ -13,11 +13,10 @@ from truenorth.alignment.result import Alignment
 from truenorth.core.attitude import angle_text, euler_from_dcm
 from truenorth.live.intake import Counts
 from truenorth.live.remaining import seconds_to
-from truenorth.state.layout import DP, DV
+from truenorth.state.layout import DP
+from truenorth.state.track import velocity_sigma
 
 Array = NDArray[np.float64]
-
-NOTHING = 1e-9  # m/s: a zero that was turned from axes into others
 
 
 @dataclass(frozen=True)
@@ -50,8 +49,7 @@ class Motion:
     @classmethod
     def known(cls, v_n: Array, position: Array, sigma: Array) -> Motion:
         """With the sigmas of a filter's states, whose vertical velocity has none where height is held."""
-        v_sigma = np.where(sigma[DV] > NOTHING, sigma[DV], np.nan)
-        return cls(v_n, position, v_sigma, sigma[DP].copy())
+        return cls(v_n, position, velocity_sigma(sigma), sigma[DP].copy())
 
     def summary(self) -> dict[str, Any]:
         """The part of :meth:`Answer.summary`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -22,7 +23,7 @@ from truenorth.records import Late
 from truenorth.state.evidence import NO_EFFECT, Effect, Evidence
 from truenorth.state.judge import Claim, judge
 from truenorth.state.layout import BG, DP, DV, PHI, SLOW_GYRO
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import Residuals, Track, velocity_sigma
 from truenorth.state.wording import sentences
 
 if TYPE_CHECKING:
@@ -124,8 +125,8 @@ class Navigation(Shown):
 
     @property
     def v_sigma(self) -> Array:
-        """(K, 3) one-sigma of velocity, m/s."""
-        return self.track.sigma[:, DV]
+        """(K, 3) one-sigma of velocity, m/s; NaN of a vertical velocity that is not measured: where height is held."""
+        return velocity_sigma(self.track.sigma)
 
     @property
     def position_sigma(self) -> Array:
@@ -242,7 +243,7 @@ class Navigation(Shown):
             "alt_m": float(last[2]),
             "position_sigma_m": sigma.tolist(),
             "v_n_m_s": self.v_n[-1].tolist(),
-            "v_n_sigma_m_s": self.v_sigma[-1].tolist(),
+            "v_n_sigma_m_s": [s if math.isfinite(s) else None for s in self.v_sigma[-1].tolist()],
             "heading_deg": float(deg(self.euler[-1, 0])),
             "pitch_deg": float(deg(self.euler[-1, 1])),
             "roll_deg": float(deg(self.euler[-1, 2])),

@@ -52,7 +52,7 @@ def _numbers(result: Navigation) -> list[tuple[str, str, str]]:
         (_("Height"), f"{s['alt_m']:.2f} m", f"{short(sigma[2])} m"),
     ]
     rows += [
-        (name, f"{x:.3f} m/s", f"{short(e)} m/s")
+        (name, f"{x:.3f} m/s", "–" if e is None else f"{short(e)} m/s")
         for name, x, e in zip((_("Velocity east"), _("Velocity north"), _("Velocity up")), v, v_sigma)
     ]
     rows += [

@@ -14,15 +14,22 @@ from truenorth.core.attitude import misalignment
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
 from truenorth.records.motion import MotionStates
-from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
+from truenorth.state.layout import BA, BG, DV, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
 
 Array = NDArray[np.float64]
 Rows = slice | NDArray[np.integer[Any]] | NDArray[np.bool_]
 
+NOTHING = 1e-9  # m/s: a zero that was turned from axes into others
 UNEVEN = 0.01  # share of the interval by which the time steps of even epochs may differ
 
 ARRAYS = ("time", "C_nb", "v_n", "position", "sensors", "P")  # of a track, a row an epoch
 RESIDUALS = ("time", "innovation", "sigma", "nis", "used", "stamp", "jumped")  # of residuals, a row a measurement
+
+
+def velocity_sigma(sigma: Array) -> Array:
+    """(..., 3) of all states' one-sigma those of the velocity, m/s; NaN where height is held and nobody measures its rate."""
+    of_velocity = sigma[..., DV]
+    return np.where(of_velocity > NOTHING, of_velocity, np.nan)
 
 
 @dataclass(frozen=True)
