@@ -71,7 +71,7 @@ def test_structs_of_navego(tmp_path):
     rates, forces = RNG.normal(0.0, 0.01, (300, 3)), RNG.normal([0.0, 0.0, -9.8], 0.01, (300, 3))
     imu = {"t": TIME, "wb": rates, "fb": forces, "arw": np.ones(3), "gb_sta": np.ones(3), "freq": 100.0}
     gnss = {"t": TIME, "lat": FIXES[:, 3], "lon": FIXES[:, 4], "h": FIXES[:, 5], "vel": FIXES[:, :3]}
-    gnss |= {"stdm": np.ones(3), "larm": np.zeros(3), "freq": 5.0}
+    gnss |= {"stdm": [1.0, 2.0, 3.0], "stdv": [0.1, 0.2, 0.3], "larm": np.zeros(3), "freq": 5.0}
     savemat(tmp_path / "imu.mat", {"imu1": imu})
     savemat(tmp_path / "gnss.mat", {"gnss": gnss})
     record, found = read_imu(tmp_path / "imu.mat"), read_gnss(tmp_path / "gnss.mat")
@@ -80,6 +80,10 @@ def test_structs_of_navego(tmp_path):
     assert "NaveGo" in record.taken_for[0].value
     np.testing.assert_array_equal(found.v_n, FIXES[:, [1, 0, 2]] * [1, 1, -1])  # north, east, down
     np.testing.assert_array_equal(np.column_stack([found.lat, found.lon, found.alt]), FIXES[:, 3:6])
+    np.testing.assert_array_equal(
+        found.position_sigma[[0, -1]], [[2.0, 1.0, 3.0]] * 2
+    )  # those are of north, east, down
+    np.testing.assert_array_equal(found.velocity_sigma[[0, -1]], [[0.2, 0.1, 0.3]] * 2)
 
 
 def test_a_struct_without_a_specification_is_no_toolboxs(tmp_path):

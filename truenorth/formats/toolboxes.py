@@ -30,6 +30,10 @@ NAVEGO_NAMES = {
     "yaw": "heading [rad]",
 }  # fmt: skip
 NED = ("VN [m/s]", "VE [m/s]", "VD [m/s]")
+NAVEGO_SIGMAS = {
+    "stdm": ("sigma_N [m]", "sigma_E [m]", "sigma_U [m]"),
+    "stdv": ("sigma_VN [m/s]", "sigma_VE [m/s]", "sigma_VU [m/s]"),
+}  # of a receiver, the same for all rows
 
 
 def imu_layout(variables: Mapping[str, Any], layout: Layout) -> tuple[Layout, Guess | None]:
@@ -73,7 +77,12 @@ def aiding(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     if np.shape(fields["vel"]) != (len(time), 3):
         return variables
     columns = {ours: np.ravel(fields[key]) for key, ours in NAVEGO_NAMES.items() if key in fields}
-    return columns | dict(zip(NED, np.asarray(fields["vel"], dtype=np.float64).T))
+    columns |= dict(zip(NED, np.asarray(fields["vel"], dtype=np.float64).T))
+    for key, ours in NAVEGO_SIGMAS.items():
+        sigmas = np.ravel(np.asarray(variables.get(f"{structs[0]}.{key}", ()), dtype=np.float64))
+        if len(sigmas) == 3 and np.all(sigmas > 0.0):
+            columns |= {name: np.full(len(time), sigma) for name, sigma in zip(ours, sigmas)}
+    return columns
 
 
 def _structs(variables: Mapping[str, Any]) -> dict[str, set[str]]:
