@@ -22,6 +22,9 @@ swing is what says how late; with s the part of w that is slow, a swell,
 
 Without the second term a mast of 7 m that rolls by 8 deg in 9 s, shown .5 s late, leaves .2 m/s that no delay explains (ours).
 
+Of an antenna that shakes more quickly than its delay is known that is so of all of w, and of the IMU itself, which shakes too: the
+mean push since the last event is not that of the moment (:mod:`truenorth.estimate.moment`).
+
 A receiver counts metres by seconds of its own. Where those run apart from the IMU's, its delay grows by r a second, and of the
 velocity y by the IMU's seconds it shows ``(1 - r) y``. Without this a place and a velocity that agree in the receiver's seconds
 would say that the clocks do.
@@ -50,7 +53,7 @@ from truenorth.aiding.row import (
 )
 from truenorth.core.attitude import cross, times
 from truenorth.core.compiled import compiled
-from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
+from truenorth.state.now import NOW_C, NOW_FORCE_B, NOW_PUSH, NOW_TURN, matrix_of, vector_of
 
 _PHI, _DV, _DP, _BG = 0, 3, 6, 9
 
@@ -115,12 +118,22 @@ def velocity_row(
 
 @compiled
 def _shown(
-    now: Any, figures: Any, at: Any, assumed: Any, measured: Any, unseen: Any, slow: Any, spin: Any, H: Any, z: Any
+    now: Any,
+    figures: Any,
+    at: Any,
+    assumed: Any,
+    measured: Any,
+    push: Any,
+    unseen: Any,
+    slow: Any,
+    spin: Any,
+    H: Any,
+    z: Any,
 ) -> None:
     """Velocity of an antenna without what of its swing is not shown, with its slow errors."""
     arm = with_state(figures, ARM, assumed, at[AT_ARM])
     lag = lag_now(now, assumed, at[AT_LAG])
-    C, w_b, push = matrix_of(now, NOW_C), vector_of(now, NOW_TURN), vector_of(now, NOW_PUSH)
+    C, w_b = matrix_of(now, NOW_C), vector_of(now, NOW_TURN)
     velocity_row(now, C, w_b, push, arm, unseen, slow, spin, lag, at[AT_ARM], at[AT_LAG], measured, H, z)
     if figures[OWN] > 0.0 and at[AT_LAG] >= 0:  # the delay grows
         rate = at[AT_LAG] + 1
@@ -142,12 +155,16 @@ def _shown(
 @row
 def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     nothing = (0.0, 0.0, 0.0)
-    _shown(now, figures, at, assumed, measured, nothing, nothing, nothing, H, z)
+    _shown(now, figures, at, assumed, measured, vector_of(now, NOW_PUSH), nothing, nothing, nothing, H, z)
 
 
 @row
 def _smoothed(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
-    C, quick, unseen = matrix_of(now, NOW_C), vector_of(measured, 3), (0.0, 0.0, 0.0)
+    C, quick, unseen, push = matrix_of(now, NOW_C), vector_of(measured, 3), (0.0, 0.0, 0.0), vector_of(now, NOW_PUSH)
+    force, mean = vector_of(measured, 12), vector_of(now, NOW_FORCE_B)
+    if not math.isnan(force[0]):
+        jolt = times(C, (force[0] - mean[0], force[1] - mean[1], force[2] - mean[2]))
+        push = (push[0] + jolt[0], push[1] + jolt[1], push[2] + jolt[2])
     if at[AT_FILTER] >= 0:
         a = at[AT_FILTER]
         unseen = by_axes(assumed, a, quick)
@@ -155,12 +172,13 @@ def _smoothed(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             for i in range(3):
                 for k in range(3):
                     H[i, a + 3 * j + k] = C[i, j] * quick[k]
-    _shown(now, figures, at, assumed, measured, unseen, vector_of(measured, 6), vector_of(measured, 9), H, z)
+    slow, spin = vector_of(measured, 6), vector_of(measured, 9)
+    _shown(now, figures, at, assumed, measured, push, unseen, slow, spin, H, z)
 
 
 VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "bias": 3, "own": 2}, swings=True)
 # As measured: velocity; the rate of the body less its mean over what the receiver filters, rad/s; its slow part, and the change of
-# that, rad/s^2: all in body axes.
+# that, rad/s^2; the specific force of this moment, m/s^2, or NaN: all in body axes.
 SMOOTHED_VELOCITY = replace(
-    VELOCITY, name="smoothed velocity", function=_smoothed, sizes={**VELOCITY.sizes, "filter": 9}, width=12
+    VELOCITY, name="smoothed velocity", function=_smoothed, sizes={**VELOCITY.sizes, "filter": 9}, width=15
 )

@@ -22,7 +22,7 @@ from truenorth.alignment.in_motion_clocks import clock_evidence, on_another_cloc
 from truenorth.alignment.in_motion_hidden import HIDDEN, hidden_from, of_level
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
-from truenorth.alignment.in_motion_moments import two_moments, with_swing_apart
+from truenorth.alignment.in_motion_moments import of_the_shake, two_moments, with_swing_apart
 from truenorth.alignment.in_motion_open import open_track
 from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_more
 from truenorth.alignment.in_motion_spread import Spread
@@ -194,6 +194,7 @@ def _aligned(
     if any(float(factor.max()) > LOUD for factor in louder.values()):  # what it found was made of noise
         task = replace(task, factors=louder)
         found, spread = _begun(task, method, tell)
+    task, found, one_of_several = of_the_shake(task, found)
     task, found, unsure = on_another_clock(task, found)
     first, bank, number, much = found.guess, spread, 1, False
     while number < passes or ((much or not found.settled) and passes > 1 and number < passes + MORE_PASSES):
@@ -232,7 +233,7 @@ def _aligned(
     if (of := answer.moving) is not None:
         more += learnt_evidence(task.factors, of.delays, task.scatter, task.swings)
         more += rate_evidence(of.clocks, of.track, task.record)
-    more += [*task.wanders, *unsure]
+    more += [*task.wanders, *one_of_several, *unsure]
     more += _seen(task, track, guess, first, gated=passes > 1, gyrocompassed=method == "gyrocompass")
     return judge_moving(answer, last or track, heading_limit, more)
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from truenorth.alignment.in_motion_passes import Pass, once_more
-from truenorth.alignment.in_motion_start import Guess
+from truenorth.alignment.in_motion_passes import Pass, begun, once_more
+from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.core.errors import DataError
+from truenorth.estimate.moment import PART, likeliest_moment, quickness
 from truenorth.estimate.moments import explained_by_two, velocities_apart
+from truenorth.state.evidence import Evidence
+from truenorth.state.mounting import Mounting
+from truenorth.state.track import Track
 
 MOST = 6  # passes, until delays have settled
 
@@ -26,6 +30,30 @@ def two_moments(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask
         return _settled(apart.learnt(track)[0], found, first)
     except DataError:  # the filter broke down: they are of one moment
         return task, found
+
+
+def of_the_shake(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, tuple[Evidence, ...]]:
+    """Task and first pass with the moment that a receiver shows of an antenna that shakes; else the same ones."""
+    if task.gnss is None or (quick := quickness(task.antenna, task.record, found.track)) == 0.0:
+        return task, found, ()
+    shaken, begin = replace(task, shaken=True), float(task.record.time[0])
+    until = begin + PART if begin + PART < task.record.time[-1] else None
+
+    def run(antenna: Mounting) -> Track:
+        return replace(shaken, antenna=antenna).run(found.guess, gated=False, until=until)
+
+    def again(antenna: Mounting, track: Track) -> Track:
+        first, back = found.guess, backtracked(task.record, track)
+        # As wide as at first: of a heading that is narrow and off, velocities say which delay it likes best.
+        guess = replace(led_back(track, back, task.spec, first), heading_sigma=first.heading_sigma)
+        return replace(shaken, antenna=antenna).run(guess, gated=False, until=until)
+
+    best = likeliest_moment(run, again, task.antenna, quick)
+    shaken = replace(shaken, antenna=best.antenna, delay_spread=best.spread)
+    try:
+        return shaken, begun(shaken, found.guess, shaken.run(found.guess, gated=False)), best.evidence
+    except DataError:  # the filter broke down
+        return task, found, ()
 
 
 def with_swing_apart(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:

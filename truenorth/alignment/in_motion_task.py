@@ -25,6 +25,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.memory import AS_IT_IS, OVER_GROUND
+from truenorth.estimate.moment import as_unsure
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.sensor_delay import on_springs
 from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_rest
@@ -101,6 +102,8 @@ class MovingTask:
     held: bool = False  # biases of the accelerometers across the vertical are taken for zero
     by_fix: bool = False  # the position is that of a fix: the IMU's but for the antenna's arm
     swing_apart: bool = False  # an arm that is estimated is not learnt from swings, of which velocities may show a part
+    shaken: bool = False  # the antenna shakes more quickly than its delay was known
+    delay_spread: float = 0.0  # s, one sigma of what else that delay may be
     sprung: bool = False  # the body goes up and down on its wheels: they do not say that it stays on the road
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
@@ -161,8 +164,8 @@ class MovingTask:
         return [replace(self, lasting=less) for less in one_less(self.lasting)]
 
     def with_lasting_fixes(self, track: Track) -> Track:
-        """A track of this task with position known no better than fixes whose slow error nobody spoke of."""
-        known = known_as_fixes(track, self.gnss, self.antenna.bias_sigma)
+        """A track of this task with position known no better than fixes whose slow error nobody spoke of; so of their delay."""
+        known = as_unsure(known_as_fixes(track, self.gnss, self.antenna.bias_sigma), self.delay_spread)
         return as_lasting(known, self.aiding(gated=True)) if self.usual_fixes else known
 
     def aiding(self, *, gated: bool) -> list[Aiding]:
@@ -176,14 +179,17 @@ class MovingTask:
             )
         if self.gnss is not None:
             shown = from_gnss(self.gnss, antenna)
-            found += (
-                with_unseen_arm(shown, self.record, float(axis_sigma(self.spec)[0].max()))
-                if self.swing_apart
-                else shown
-            )
+            found += self._of_swing(shown)
         found += [source if gated else replace(source, gate=0.0) for source in self.more]
         found = with_scatter(louder(with_slow(found, self.lasting), self.factors), self.scattered)
         return on_springs(found) if self.sprung else found
+
+    def _of_swing(self, shown: list[Aiding]) -> list[Aiding]:
+        """A receiver's measurements with what is known of the antenna's swing."""
+        if not (self.swing_apart or self.shaken):
+            return shown
+        askew = float(axis_sigma(self.spec)[0].max())
+        return with_unseen_arm(shown, self.record, askew, shaken=self.shaken)
 
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""

@@ -13,6 +13,8 @@ from truenorth.aiding.aids import Aid, Gnss
 from truenorth.alignment.in_motion_learnt import differs
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
+from truenorth.estimate.moment import PART as SHAKE_PART
+from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.estimate.slow_fit import fitted
@@ -50,9 +52,9 @@ MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 
 def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dict[str, Any], Track, list[Evidence]]:
     """The plan with slow errors of aids that innovations show, aids as late as found, the track, and what is to be said."""
-    said: list[Evidence] = []
     asked = given
     track = plan.run(plan.sources(given), smooth=smooth)
+    plan, given, track, said = _of_the_shake(plan, given, track, smooth)
     first = plan, track
     plan, track = _with_late_swing(plan, given, track, smooth)
     plan, track = _with_swing_apart(plan, given, track, smooth)
@@ -83,7 +85,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     plan, track, lasting = with_slow_errors(plan, given, track, smooth)
     said += lasting
     receiver = given.get(Gnss.key)
-    track = track.whole()
+    track = as_unsure(track.whole(), plan.delay_spread)
     if isinstance(receiver, Gnss):
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
@@ -134,6 +136,29 @@ def _with_late_swing(plan: Plan, given: dict[str, Any], track: Track, smooth: bo
     except DataError:  # the filter broke down
         return plan, track
     return (later, other) if explained_by_two(other, track) else (plan, track)
+
+
+def _of_the_shake(
+    plan: Plan, given: dict[str, Any], track: Track, smooth: bool
+) -> tuple[Plan, dict[str, Any], Track, list[Evidence]]:
+    """The plan, aids and track with the moment that a receiver shows of an antenna that shakes; else the same ones."""
+    receiver = given.get(Gnss.key)
+    if not isinstance(receiver, Gnss) or not (antenna := receiver.mounting):
+        return plan, given, track, []
+    if (quick := quickness(antenna, plan.record, track)) == 0.0:
+        return plan, given, track, []
+    shaken, open_ = replace(plan, shaken=True), ungated(given)
+    short = replace(shaken, record=plan.record.between(None, plan.record.time[0] + SHAKE_PART))
+
+    def run(other: Mounting) -> Track:
+        return short.run(short.sources({**open_, Gnss.key: receiver.mounted(replace(other, gate=0.0))}))
+
+    best = likeliest_moment(run, lambda other, _: run(other), antenna, quick)
+    shaken, later = replace(shaken, delay_spread=best.spread), {**given, Gnss.key: receiver.mounted(best.antenna)}
+    try:
+        return shaken, later, shaken.run(shaken.sources(later), smooth=smooth), [*best.evidence]
+    except DataError:  # the filter broke down
+        return plan, given, track, []
 
 
 def _with_swing_apart(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> tuple[Plan, Track]:

@@ -42,6 +42,8 @@ class Plan:
     factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
     swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
     late: bool = False  # what the receiver shows late is its antenna's slow swing, too
+    shaken: bool = False  # all of that swing: the antenna shakes more quickly than its delay was known
+    delay_spread: float = 0.0  # s, one sigma of what else that delay may be
     unseen: float = 0.0  # share of that swing which is in their noise
     swung: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
     stamps: float = 0.0  # s, one sigma of the receiver's stamps, as innovations have shown it
@@ -55,7 +57,8 @@ class Plan:
 
     def run(self, sensors: Sequence[Aiding], smooth: bool = False) -> Track:
         """Filter with these measurements; smooth once that is asked for (:meth:`Track.whole`): it takes ten times as long."""
-        used = [*with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late), *self.always]
+        shown = with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late, shaken=self.shaken)
+        used = [*shown, *self.always]
         navigated = partial(
             navigate_track,
             self.record,

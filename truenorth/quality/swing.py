@@ -43,6 +43,7 @@ Array = NDArray[np.float64]
 
 VELOCITIES = "GNSS velocity"
 SMOOTHED = 1.0  # s, over which a receiver takes a mean, or its interval where that is shorter
+SHAKEN = 0.05  # s, over which a shake is looked at: what is quicker no receiver shows
 UNSEEN_ARM = "GNSS unseen arm"  # the name of its states
 LEAST = 1e-6  # m, one sigma of an arm that is nothing along an axis
 SEEN = 0.3  # of the noise of a row, from which a swing (RMS) is seen in it: a tenth of its variance
@@ -141,28 +142,53 @@ def swing(track: Track, record: ImuRecord, arm: Array, time: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(np.einsum("kia,kab,kib->ki", C, covariance, C), 0.0)))
 
 
+def shake(track: Track, record: ImuRecord, arm: Array) -> tuple[float, float]:
+    """RMS of the quick part of an antenna's velocity, m/s, and how quickly it turns, rad/s: its change over it.
+
+    Of what is quicker than a second, and slower than a tenth of one: by the rates on the arm, and by the forces themselves.
+    """
+    dtheta, dvel = increments(record)
+    T, middle = record.steps[:, None], record.time - 0.5 * record.steps
+    swings = np.cross(dtheta / T - track.gyro_bias[-1], arm)
+    pushed = np.cumsum(dvel - _means(record, dvel / T, middle, 0.5 * SMOOTHED) * T, axis=0)
+    moves = swings + pushed
+    slow = _means(record, moves, middle, 0.5 * SMOOTHED)
+    quick = _means(record, moves - slow, middle, 0.5 * SHAKEN)
+    size = math.sqrt(float(np.mean(np.sum(quick**2, axis=1))))
+    change = np.gradient(quick, middle, axis=0)
+    return size, math.sqrt(float(np.mean(np.sum(change**2, axis=1)))) / max(size, LEAST)
+
+
 def with_unseen_arm(
-    aiding: Iterable[Aiding], record: ImuRecord, askew: float, *, known: bool = False, late: bool = False
+    aiding: Iterable[Aiding],
+    record: ImuRecord,
+    askew: float,
+    *,
+    known: bool = False,
+    late: bool = False,
+    shaken: bool = False,
 ) -> list[Aiding]:
     """The same sources; a receiver's velocities with the part of an estimated arm whose swing they do not show, among their states.
 
     It is as long as the arm may be, along each axis; `askew`, scale factors and misalignments of the gyros, adds to it. With
     `known`, of an arm that is known as well, where its swing is large enough to be seen in a row's noise. With `late`, a delay that
-    is estimated shows the slow swing of an earlier moment.
+    is estimated shows the slow swing of an earlier moment; with `shaken`, all of the swing.
     """
-    return [_smoothed(s, record, askew, known, late) if s.name == VELOCITIES else s for s in aiding]
+    return [_smoothed(s, record, askew, known, late, shaken) if s.name == VELOCITIES else s for s in aiding]
 
 
-def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late: bool) -> Aiding:
+def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late: bool, shaken: bool) -> Aiding:
     estimated = source.states.get("lever arm")
     known = known and bool(source.lever_arm.any())
-    late = late and is_swung_late(source)
+    late = (late or shaken) and is_swung_late(source)
     if estimated is None and not (known or late):
         return source
     _, quick = _quick(record, source.time)
     middle = record.time - 0.5 * record.steps
-    slow = [_at(middle, of, source.time) for of in slow_rates(record)] if late else [np.zeros_like(quick)] * 2
-    shown = replace(source, kind=SMOOTHED_VELOCITY, measured=np.hstack([source.measured, quick, *slow]))
+    moments = [*slow_rates(record), np.full_like(record.gyro, np.nan)] if not shaken else shaken_rates(record)
+    nothing = [np.zeros_like(quick), np.zeros_like(quick), np.full_like(quick, np.nan)]
+    earlier = [_at(middle, of, source.time) for of in moments] if late else nothing
+    shown = replace(source, kind=SMOOTHED_VELOCITY, measured=np.hstack([source.measured, quick, *earlier]))
     if estimated is None:
         swings = np.linalg.norm(np.cross(quick, source.lever_arm), axis=1)
         if not known or math.sqrt(float(np.mean(swings**2))) < SEEN * float(np.nanmedian(source.sigma)):
@@ -222,6 +248,16 @@ def slow_rates(record: ImuRecord) -> tuple[Array, Array]:
             part = _means(record, part, middle, 0.5 * SMOOTHED)
         slow, rest = slow + part, rest - part
     return slow, np.gradient(slow, middle, axis=0) if len(middle) > 1 else np.zeros_like(slow)
+
+
+@remembered
+def shaken_rates(record: ImuRecord) -> tuple[Array, Array, Array]:
+    """(N, 3) rates of the rows, rad/s, how they change, rad/s^2, and specific forces, m/s^2, without what no receiver shows."""
+    middle = record.time - 0.5 * record.steps
+    both = np.hstack(increments(record)) / record.steps[:, None]
+    means = _means(record, both, middle, 0.5 * SHAKEN)
+    rates, forces = means[:, :3], means[:, 3:]
+    return rates, np.gradient(rates, middle, axis=0) if len(middle) > 1 else np.zeros_like(rates), forces
 
 
 def _filters(time: Array) -> float:

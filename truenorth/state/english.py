@@ -177,6 +177,10 @@ SENTENCES = {
         "later"
     ),
     "clock.gps_or_utc": "GPS time is 18 s ahead of UTC: one of the two logs may be in GPS time, the other in UTC",
+    "delay.one_of_several": (
+        "{name}: its stamps are {size:.3f} s late or, with a chance of {chance:.2g}, {other:.3f} s: the antenna shakes too "
+        "quickly to tell; what that does is in sigma"
+    ),
     "clock.may_run": (
         "the clocks of the IMU and the {name} may run apart by {size:.0f} ppm: the log neither shows nor rules this out "
         "(likelihood ratio {ratio:.3g}), and what it would do is in sigma by its chance: log more turns, or a longer log"
