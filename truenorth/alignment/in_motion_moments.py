@@ -8,7 +8,7 @@ from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.moment import PART, likeliest_moment, quickness
+from truenorth.estimate.moment import likeliest_moment, quickness, tells_until
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.state.evidence import Evidence
 from truenorth.state.mounting import Mounting
@@ -36,8 +36,8 @@ def of_the_shake(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, tuple
     """Task and first pass with the moment that a receiver shows of an antenna that shakes; else the same ones."""
     if task.gnss is None or (quick := quickness(task.antenna, task.record, found.track)) == 0.0:
         return task, found, ()
-    shaken, begin = replace(task, shaken=True), float(task.record.time[0])
-    until = begin + PART if begin + PART < task.record.time[-1] else None
+    shaken, end = replace(task, shaken=True), tells_until(found.track)
+    until = end if end < task.record.time[-1] else None
 
     def run(antenna: Mounting) -> Track:
         return replace(shaken, antenna=antenna).run(found.guess, gated=False, until=until)

@@ -5,8 +5,8 @@ and a delay that is known to .15 s is one of seven periods of that: in the first
 likes, and is sure of it (70 of its sigmas off). Rows that come as often as the antenna shakes make it worse: they show a slow wave,
 which looks like a tilt. So such a log is tried with delays in steps in which the shake turns by a radian, each with a step as its
 sigma: a sum of Gaussians (H. Sorenson and D. Alspach, "Recursive Bayesian estimation using Gaussian sums", Automatica 7 (1971)).
-The next passes begin with the likeliest, with what is known of the delay beforehand. Delays that a log does not tell from it by more
-than their likelihoods scatter by chance, are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
+The next passes begin with the likeliest, with what is known of the delay beforehand. Delays that a log does not tell from it by
+more than their likelihoods scatter by chance are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
 hypotheses", Econometrica 57 (1989)).
 
 What is slower than a radian in two sigmas of the delay is found by passes one after the other (:mod:`truenorth.estimate.latency`);
@@ -39,10 +39,12 @@ Array = NDArray[np.float64]
 
 TURNS = 3.0  # rad, by which the shake turns in one sigma of the delay: half a period
 SEEN = 6.0  # sigmas, in which all rows together show the shake
+USUAL_ARM = 1.0  # m, at least, of an antenna of which nobody says where it is
 FAR = 3.5  # sigmas of the delay, as far as it is tried
 MOST = 60  # delays
 BEGINS = 20.0  # s, in which a filter comes to know level and heading
-PART = 240.0  # s of a log, that tell them apart
+PART = 240.0  # s on the move, that tell them apart
+SETS_OFF = 1.0  # m/s
 ROUNDS, FINALISTS = 2, 8  # of the likeliest, each begun with the delay that it has found
 SCATTER = 2.0  # sigmas, by which chance may have told two delays apart
 APART = 3.0  # sigmas, by which a delay is another one than that found
@@ -60,9 +62,19 @@ def quickness(antenna: Mounting, record: ImuRecord, track: Track) -> float:
     rows = next((r for r in track.residuals if r.name == VELOCITIES), None)
     if antenna.latency_sigma == 0.0 or rows is None or len(rows.time) < 2:
         return 0.0
-    size, rate = shake(track, record, shown_arm(track, antenna.lever_arm))
+    until = tells_until(track)
+    record = record.between(until - PART, until)
+    # Of a shake at a wrong moment an arm that is estimated comes out as nothing.
+    arm = np.maximum(np.abs(antenna.lever_arm), np.abs(shown_arm(track, antenna.lever_arm)))
+    size, rate = shake(track, record, np.maximum(arm, min(antenna.lever_arm_sigma, USUAL_ARM)))
     seen = size * math.sqrt(len(rows.time)) / float(np.nanmedian(rows.sigma))
     return rate if seen > SEEN and rate * max(antenna.latency_sigma, LATENCY_SIGMA) > TURNS else 0.0
+
+
+def tells_until(track: Track) -> float:
+    """Until when, s, a log is looked at: what tells delays apart begins when the vehicle sets off."""
+    moves = np.linalg.norm(track.v_n, axis=1) > SETS_OFF
+    return float(track.time[int(np.argmax(moves)) if moves.any() else 0]) + PART
 
 
 class Likeliest(NamedTuple):

@@ -13,8 +13,7 @@ from truenorth.aiding.aids import Aid, Gnss
 from truenorth.alignment.in_motion_learnt import differs
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
-from truenorth.estimate.moment import PART as SHAKE_PART
-from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness
+from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness, tells_until
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.estimate.slow_fit import fitted
@@ -148,7 +147,7 @@ def _of_the_shake(
     if (quick := quickness(antenna, plan.record, track)) == 0.0:
         return plan, given, track, []
     shaken, open_ = replace(plan, shaken=True), ungated(given)
-    short = replace(shaken, record=plan.record.between(None, plan.record.time[0] + SHAKE_PART))
+    short = replace(shaken, record=plan.record.between(None, tells_until(track)))
 
     def run(other: Mounting) -> Track:
         return short.run(short.sources({**open_, Gnss.key: receiver.mounted(replace(other, gate=0.0))}))
