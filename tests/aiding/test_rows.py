@@ -8,7 +8,7 @@ import pytest
 from truenorth.aiding.heading import HEADING
 from truenorth.aiding.magnetometer import FIELD
 from truenorth.aiding.source import KINDS, Aiding, state
-from truenorth.aiding.velocity import SMOOTHED_VELOCITY
+from truenorth.aiding.velocity import SHAKEN_VELOCITY, SMOOTHED_VELOCITY
 from truenorth.aiding.wheel import COUNTED_FORWARD, WHEEL
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.linalg import padded
@@ -31,9 +31,10 @@ W_B = np.array([0.3, -0.2, 0.5])
 DRIFTING = "velocity by another clock"
 
 ROWS = {**KINDS, "odometer": WHEEL, "heading": HEADING, "magnetic field": FIELD, "smoothed velocity": SMOOTHED_VELOCITY}
+ROWS["shaken velocity"] = SHAKEN_VELOCITY
 ROWS[DRIFTING] = KINDS["velocity"]
 
-LATE = {"body velocity": 0.05, "odometer": 0.05}
+LATE = {"body velocity": 0.05, "odometer": 0.05, "shaken velocity": 0.02}
 
 
 def _aiding(kind):
@@ -46,6 +47,7 @@ def _aiding(kind):
         "position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0],
         "heading": [0.3],
         "smoothed velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6, 0.3, -0.2, 0.4, 0.8, -0.5, 0.7],
+        "shaken velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6, 0.3, -0.2, 0.4, 0.8, -0.5, 0.7, 0.3, -0.6, 9.1],
     }.get(kind, [1.0, 2.0, 3.0])
     C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
     figures = {"magnetic field": (0.05, 0.4, -0.9), "odometer": COUNTED_FORWARD, DRIFTING: (1.0,)}.get(kind, ())

@@ -158,13 +158,10 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     _shown(now, figures, at, assumed, measured, vector_of(now, NOW_PUSH), nothing, nothing, nothing, H, z)
 
 
-@row
-def _smoothed(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
-    C, quick, unseen, push = matrix_of(now, NOW_C), vector_of(measured, 3), (0.0, 0.0, 0.0), vector_of(now, NOW_PUSH)
-    force, mean = vector_of(measured, 12), vector_of(now, NOW_FORCE_B)
-    if not math.isnan(force[0]):
-        jolt = times(C, (force[0] - mean[0], force[1] - mean[1], force[2] - mean[2]))
-        push = (push[0] + jolt[0], push[1] + jolt[1], push[2] + jolt[2])
+@compiled
+def _with_swing(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, push: Any, H: Any, z: Any) -> None:
+    """Velocity of an antenna without the part of its swing that is a state, and with that of an earlier moment."""
+    C, quick, unseen = matrix_of(now, NOW_C), vector_of(measured, 3), (0.0, 0.0, 0.0)
     if at[AT_FILTER] >= 0:
         a = at[AT_FILTER]
         unseen = by_axes(assumed, a, quick)
@@ -176,9 +173,24 @@ def _smoothed(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     _shown(now, figures, at, assumed, measured, push, unseen, slow, spin, H, z)
 
 
+@row
+def _smoothed(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    _with_swing(now, figures, at, assumed, measured, vector_of(now, NOW_PUSH), H, z)
+
+
+@row
+def _shaken(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    force, mean, push = vector_of(measured, 12), vector_of(now, NOW_FORCE_B), vector_of(now, NOW_PUSH)
+    jolt = times(matrix_of(now, NOW_C), (force[0] - mean[0], force[1] - mean[1], force[2] - mean[2]))
+    push = (push[0] + jolt[0], push[1] + jolt[1], push[2] + jolt[2])
+    _with_swing(now, figures, at, assumed, measured, push, H, z)
+
+
 VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "bias": 3, "own": 2}, swings=True)
 # As measured: velocity; the rate of the body less its mean over what the receiver filters, rad/s; its slow part, and the change of
-# that, rad/s^2; the specific force of this moment, m/s^2, or NaN: all in body axes.
+# that, rad/s^2: all in body axes.
 SMOOTHED_VELOCITY = replace(
-    VELOCITY, name="smoothed velocity", function=_smoothed, sizes={**VELOCITY.sizes, "filter": 9}, width=15
+    VELOCITY, name="smoothed velocity", function=_smoothed, sizes={**VELOCITY.sizes, "filter": 9}, width=12
 )
+# The same with all of the rate in the place of its slow part; besides, the specific force of this moment, m/s^2, body axes.
+SHAKEN_VELOCITY = replace(SMOOTHED_VELOCITY, name="shaken velocity", function=_shaken, width=15)

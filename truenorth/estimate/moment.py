@@ -46,7 +46,7 @@ BEGINS = 20.0  # s, in which a filter comes to know level and heading
 PART = 240.0  # s on the move, that tell them apart
 SETS_OFF = 1.0  # m/s
 ROUNDS, FINALISTS = 2, 8  # of the likeliest, each begun with the delay that it has found
-SCATTER = 2.0  # sigmas, by which chance may have told two delays apart
+SCATTER = 2.0  # sigmas, by which chance may have parted two delays
 APART = 3.0  # sigmas, by which a delay is another one than that found
 
 

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
-from truenorth.aiding.velocity import SMOOTHED_VELOCITY
+from truenorth.aiding.velocity import SHAKEN_VELOCITY, SMOOTHED_VELOCITY
 from truenorth.core.remembered import remembered
 from truenorth.errors.group import Group
 from truenorth.quality.stamps import likelihoods, pairs
@@ -198,10 +198,10 @@ def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late
         return source
     _, quick = _quick(record, source.time)
     middle = record.time - 0.5 * record.steps
-    moments = [*slow_rates(record), np.full_like(record.gyro, np.nan)] if not shaken else shaken_rates(record)
-    nothing = [np.zeros_like(quick), np.zeros_like(quick), np.full_like(quick, np.nan)]
-    earlier = [_at(middle, of, source.time) for of in moments] if late else nothing
-    shown = replace(source, kind=SMOOTHED_VELOCITY, measured=np.hstack([source.measured, quick, *earlier]))
+    earlier = (shaken_rates if shaken else slow_rates)(record) if late else None
+    at = [np.zeros_like(quick)] * 2 if earlier is None else [_at(middle, of, source.time) for of in earlier]
+    kind = SHAKEN_VELOCITY if late and shaken else SMOOTHED_VELOCITY
+    shown = replace(source, kind=kind, measured=np.hstack([source.measured, quick, *at]))
     if estimated is None:
         swings = np.linalg.norm(np.cross(quick, source.lever_arm), axis=1)
         if not known or math.sqrt(float(np.mean(swings**2))) < SEEN * float(np.nanmedian(source.sigma)):
