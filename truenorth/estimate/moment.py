@@ -6,7 +6,7 @@ likes, and is sure of it (70 of its sigmas off). Rows that come as often as the 
 which looks like a tilt. So such a log is tried with delays in steps in which the shake turns by a radian, each with a step as its
 sigma: a sum of Gaussians (H. Sorenson and D. Alspach, "Recursive Bayesian estimation using Gaussian sums", Automatica 7 (1971)).
 The next passes begin with the likeliest, with what is known of the delay beforehand. Delays that a log does not tell from it by
-more than their likelihoods scatter by chance are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
+more than their likelihoods scatter are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
 hypotheses", Econometrica 57 (1989)).
 
 What is slower than a radian in two sigmas of the delay is found by passes one after the other (:mod:`truenorth.estimate.latency`);
@@ -46,7 +46,7 @@ BEGINS = 20.0  # s, in which a filter comes to know level and heading
 PART = 240.0  # s on the move, that tell them apart
 SETS_OFF = 1.0  # m/s
 ROUNDS, FINALISTS = 2, 8  # of the likeliest, each begun with the delay that it has found
-SCATTER = 2.0  # sigmas, by which chance may have parted two delays
+TINY = 1e-300
 APART = 3.0  # sigmas, by which a delay is another one than that found
 
 
@@ -197,7 +197,9 @@ def _unsure(best: Moment, found: Sequence[Moment], ratios: Sequence[float]) -> t
     """By how much the delay may be another one, s, and what the others do that a log does not tell from it, by their chance."""
     late, sigma = _late(best)
     scatter = np.array([_scatter(best, one) for one in found])
-    odds = np.exp(0.5 * np.minimum(np.array(ratios) + SCATTER * scatter, 0.0))
+    # Of Gaussian errors a ratio of ``-d^2`` scatters by ``2 d``: one that scatters by more says that much less.
+    less = np.maximum(-np.array(ratios), TINY)
+    odds = np.exp(-0.5 * less / np.maximum(scatter**2 / (4.0 * less), 1.0))
     others = [
         (one, float(chance))
         for one, chance in zip(found, odds / odds.sum(), strict=True)
