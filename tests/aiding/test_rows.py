@@ -7,6 +7,7 @@ import pytest
 
 from truenorth.aiding.heading import HEADING
 from truenorth.aiding.magnetometer import FIELD
+from truenorth.aiding.position import CONVERGING_POSITION
 from truenorth.aiding.source import KINDS, Aiding, state
 from truenorth.aiding.velocity import SHAKEN_VELOCITY, SMOOTHED_VELOCITY
 from truenorth.aiding.wheel import COUNTED_FORWARD, WHEEL
@@ -33,6 +34,7 @@ DRIFTING = "velocity by another clock"
 ROWS = {**KINDS, "odometer": WHEEL, "heading": HEADING, "magnetic field": FIELD, "smoothed velocity": SMOOTHED_VELOCITY}
 ROWS["shaken velocity"] = SHAKEN_VELOCITY
 ROWS[DRIFTING] = KINDS["velocity"]
+ROWS["converging position"] = CONVERGING_POSITION
 
 LATE = {"body velocity": 0.05, "odometer": 0.05, "shaken velocity": 0.02}
 
@@ -45,6 +47,7 @@ def _aiding(kind):
         states["lag"] = replace(states["lag"], drift=1e-4)
     measured = {
         "position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0],
+        "converging position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0, 2.0, 3.0, 5.0],
         "heading": [0.3],
         "smoothed velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6, 0.3, -0.2, 0.4, 0.8, -0.5, 0.7],
         "shaken velocity": [1.0, 2.0, 3.0, 0.4, -0.3, 0.6, 0.3, -0.2, 0.4, 0.8, -0.5, 0.7, 0.3, -0.6, 9.1],

@@ -65,6 +65,15 @@ def test_without_longitude_or_height_the_alignment_is_named():
     check_fixes(journey(), replace(PLACE, alt=0.0, vertical_sigma=100.0), T[0])
 
 
+def test_first_fixes_that_are_poor_lie_as_far_off_as_they_say():
+    r = journey()
+    far = replace(r, lat=r.lat + 1200.0 / R, alt=r.alt + 300.0)
+    check_fixes(replace(far, position_sigma=np.tile([50.0, 50.0, 85.0], (N, 1))), PLACE, T[0])
+    assert "columns lat and lon" in refused(check_fixes, replace(far, position_sigma=np.full((N, 3), 5.0)), PLACE, T[0])
+    high = replace(far, lat=r.lat, position_sigma=np.full((N, 3), 5.0))
+    assert "column alt" in refused(check_fixes, high, PLACE, T[0])
+
+
 def test_what_may_have_been_driven_or_is_one_outlier_passes():
     r = journey()
     far = replace(r, lat=r.lat + 5000.0 / R)

@@ -16,6 +16,10 @@ the vehicle's way alone, and the next pass begins with it.
 That way is a curve: a place is predicted as ``p - tau v + a tau^2/2``. Of an aircraft that turns by 4.6 m/s^2, shown .4 s late, the
 tangent is off by .4 m, which fixes of centimetres take for a delay that grows.
 
+A receiver that starts up errs by metres for a while, and says so row by row. Its own state is that error in parts of what the row
+says, x of a variance of one: ``z = ... - s dx``, so that the error of two rows differs as what they say does
+(:mod:`truenorth.quality.converging`).
+
 Rows are in ENU. A velocity is measured in the axes at the true place; those at the computed place are turned against them
 by the convergence of the meridians, ``tan L dp_E/R`` about up.
 
@@ -26,9 +30,10 @@ Source: P. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Nav
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
-from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, Row, beyond_noise, lag_now, row, with_state
+from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, AT_OWN, Row, beyond_noise, lag_now, row, with_state
 from truenorth.core.attitude import cross, rotate, times, times_back
 from truenorth.core.compiled import compiled
 from truenorth.state.now import (
@@ -125,8 +130,9 @@ def position_row(
             H[j, at_bias + j] = -1.0
 
 
-@row
-def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+@compiled
+def _shown(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any) -> None:
+    """Position of an antenna with its slow errors."""
     arm = with_state(figures, ARM, assumed, at[AT_ARM])
     bias = (0.0, 0.0, 0.0)
     if at[AT_BIAS] >= 0:
@@ -145,4 +151,23 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     position_row(now, C, w_b, turn, push, arm, lag, bias, at[AT_ARM], at[AT_LAG], at[AT_BIAS], measured, H, z)
 
 
+@row
+def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    _shown(now, figures, at, assumed, measured, H, z)
+
+
+@row
+def _converging(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    _shown(now, figures, at, assumed, measured, H, z)
+    own = at[AT_OWN]
+    if own >= 0:
+        for j in range(3):
+            z[j] += measured[3 + j] * assumed[own + j]
+            H[j, own + j] = -measured[3 + j]
+
+
 POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1}, swings=True, swings_late=True, unit="m")
+# As measured: latitude, longitude, height; how large the error is that a receiver has not lost yet, m, east, north, up.
+CONVERGING_POSITION = replace(
+    POSITION, name="converging position", function=_converging, sizes={**POSITION.sizes, "own": 3}, width=6
+)

@@ -16,6 +16,7 @@ from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.given import fed_back
 from truenorth.navigation.result import Altitude
 from truenorth.quality.aid_noise import louder
+from truenorth.quality.converging import with_convergence
 from truenorth.quality.slow_aids import Slow, with_slow
 from truenorth.quality.stamps import with_scatter
 from truenorth.quality.swing import with_unseen_arm
@@ -52,7 +53,7 @@ class Plan:
     def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
         """Measurements of all aids."""
         said = [source for a in given.values() for source in a.sources(self.altitude)]
-        loud = louder(with_slow(said, self.slow), self.factors)
+        loud = louder(with_slow(with_convergence(said), self.slow), self.factors)
         return with_scatter(with_scatter(loud, self.swung), self.stamped)
 
     def run(self, sensors: Sequence[Aiding], smooth: bool = False) -> Track:

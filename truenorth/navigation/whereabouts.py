@@ -71,8 +71,11 @@ def check_fixes(record: GnssRecord, place: Position, time: float, *, heights: bo
         return
     lat, lon, alt = record.lat[rows], record.lon[rows], record.alt[rows]
     passed = record.time[rows] - time
+    # First fixes that are poor and say so lie as far off as they say.
+    said = np.zeros((len(rows), 3)) if record.position_sigma is None else np.nan_to_num(record.position_sigma[rows])
     far = _distance(lat, lon, place)
-    if np.median(far - FASTEST * passed) > LEAST_FAR + SIGMAS * place.horizontal_sigma:
+    rough = np.hypot(place.horizontal_sigma, said[:, :2].max(axis=1))
+    if np.median(far - FASTEST * passed - SIGMAS * rough) > LEAST_FAR:
         k = int(np.argsort(far)[len(far) // 2])
         raise DataError(
             f"{record.source}: row {rows[k] + 1}, columns lat and lon: {_degrees(lat[k], lon[k])}, {_apart(far[k])} from "
@@ -80,7 +83,7 @@ def check_fixes(record: GnssRecord, place: Position, time: float, *, heights: bo
             f"begin there: {_mistake(float(lat[k]), float(lon[k]), place, float(far[k]))}"
         )
     if heights:
-        _check_heights(record.source, rows, alt, passed, place)
+        _check_heights(record.source, rows, alt, passed, place, said[:, 2])
 
 
 def check_heights(record: HeightRecord, place: Position, time: float) -> None:
@@ -92,13 +95,16 @@ def check_heights(record: HeightRecord, place: Position, time: float) -> None:
         As for :func:`check_fixes`.
     """
     rows = np.flatnonzero(record.time >= time)[:FIXES]
-    _check_heights(record.source, rows, record.alt[rows], record.time[rows] - time, place)
+    _check_heights(record.source, rows, record.alt[rows], record.time[rows] - time, place, np.zeros(len(rows)))
 
 
-def _check_heights(source: str, rows: NDArray[np.intp], alt: Array, passed: Array, place: Position) -> None:
+def _check_heights(
+    source: str, rows: NDArray[np.intp], alt: Array, passed: Array, place: Position, said: Array
+) -> None:
     off = np.abs(alt - place.alt)
     known = np.isfinite(off)
-    if not known.any() or not np.median((off - STEEPEST * passed)[known]) > LEAST_HIGH + SIGMAS * place.vertical_sigma:
+    beyond = off - STEEPEST * passed - SIGMAS * np.hypot(place.vertical_sigma, said)
+    if not known.any() or not np.median(beyond[known]) > LEAST_HIGH:
         return
     k = int(np.argsort(off)[known.sum() // 2])  # NaN is sorted behind
     if abs(alt[k] + place.alt) < CLOSER * off[k] + LEAST_HIGH:

@@ -8,6 +8,7 @@ import numpy as np
 
 from truenorth.core.language import translated as _
 from truenorth.errors.deflection import NAME as DEFLECTION
+from truenorth.quality.converging import CONVERGING
 from truenorth.report.document import Table
 from truenorth.report.numbers import of_sigma, short
 from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
@@ -43,8 +44,9 @@ def estimated_rows(result: Navigation) -> list[tuple[str, str, str]]:
     for name, found in result.estimated().items():
         own = slice(None, None, 4) if name in SCALES else slice(None)  # of nine elements by rows the diagonal
         open_ = not np.any(is_estimated(np.array(found["sigma"])[own], np.array(priors[name])[own]))
-        if name.startswith("slow") or (open_ and name in (DEFLECTION, *SCALES)):
-            continue  # the slow parts of the IMU's biases, which the track holds; what is of earth or IMU and does not show
+        if name.startswith("slow") or name == CONVERGING or (open_ and name in (DEFLECTION, *SCALES)):
+            # The slow parts of the IMU's biases, which the track holds; what is over; what is of earth or IMU and does not show.
+            continue
         name = SCALES.get(name, name)
         unit, factor = _unit(name)
         sigmas = [factor * x for x in found["sigma"][own]]
