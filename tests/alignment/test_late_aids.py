@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from tests.runs import some
-from truenorth import Gnss, GnssRecord, Odometer, align
+from truenorth import AlignmentError, Gnss, GnssRecord, Odometer, align
 from truenorth.core.attitude import misalignment
 from truenorth.core.position import Position
 from truenorth.core.yaml_file import read_mapping
+from truenorth.live import Aligner
 from truenorth.navigation import Mounting
 from truenorth.report.page import alignment_page
 from truenorth.simulation.scenario import SHIPPED, read_scenario
@@ -80,3 +81,63 @@ def test_an_odometer_that_begins_late(drive):
     assert np.all(off(answer, made.motion) < 4.0)
     assert any(item.key == "aids.late" for item in answer.evidence)
     assert answer.position.horizontal_sigma > 50.0
+
+
+@pytest.mark.parametrize("steady", [False, True])
+def test_too_few_seconds_of_fixes_after_a_drive_are_refused_as_that(steady):
+    """The whole log was used, unaided drive included: 3 of 30 answers 9 to 16 sigmas off, 18 refused for other reasons.
+
+    A drive that is straight and even looks like a base that is shaken: there the receiver says that it is a drive.
+    """
+    made, gnss = straight_on() if steady else under_way()
+    with pytest.raises(AlignmentError, match=r"only 7\.\d s of the log are aided, and the vehicle drives before that"):
+        align(made.record.between(None, gnss.time[0] + 7.5), None, "industrial", aid=Gnss(gnss, ANTENNA))
+    answer = align(made.record, None, "industrial", aid=Gnss(gnss, ANTENNA))
+    assert answer.status in ("aligned", "level_only"), answer.reasons
+    assert np.all(off(answer, made.motion) < 4.0)
+    assert any(item.key == "aids.late" for item in answer.evidence)
+
+
+def test_a_running_alignment_waits_for_more_of_them():
+    made, gnss = under_way()
+    record, said, fix = made.record, [], 0
+    with Aligner(None, "industrial", kind=record.kind, background=False) as aligner:
+        for first in range(0, len(record), 100):
+            part = slice(first, first + 100)
+            aligner.push(record.time[part], record.gyro[part], record.accel[part])
+            upto = int(np.searchsorted(gnss.time, record.time[part][-1] - 0.3))
+            if upto > fix:
+                rows = slice(fix, upto)
+                aligner.push_gnss(gnss.time[rows], gnss.lat[rows], gnss.lon[rows], gnss.alt[rows], v_n=gnss.v_n[rows])
+                fix = upto
+            said.append((float(record.time[part][-1]) - gnss.time[0], aligner.answer, aligner.failure))
+    early = [(answer, failure) for since, answer, failure in said if 4.0 < since < 9.0]
+    assert early
+    assert all(answer is None and "of the log are aided" in failure for answer, failure in early)
+    _, answer, failure = said[-1]
+    assert answer is not None
+    assert failure == ""
+    assert answer.status in ("aligned", "level_only")
+
+
+def under_way():
+    """A van that drives off at once, and its fixes from half a minute on."""
+    mapping = read_mapping(SHIPPED / "van.yaml") | {"duration": "70 s"}
+    mapping["motion"] = mapping["motion"] | {"wait": "0 s"}
+    scenario = read_scenario(mapping)
+    return scenario.simulate(seed=3, run=1), from_on(scenario.simulate_aiding(seed=3, run=1)["gnss"].record, 30.0)
+
+
+def straight_on():
+    """A van on a straight road at one speed for 45 s, which then goes about; fixes from half a minute on."""
+    legs = [{"kind": "straight", "duration": "45 s"}]
+    for angle in (60.0, -80.0, 70.0):
+        legs += [
+            {"kind": "turn", "angle": f"{angle:g} deg", "rate": "15 deg/s"},
+            {"kind": "straight", "duration": "6 s"},
+        ]
+    mapping = read_mapping(SHIPPED / "van.yaml") | {"duration": "70 s"}
+    mapping["motion"] = {"kind": "legs", "heading": "70 deg", "speed": "12 m/s", "legs": legs}
+    mapping["position"] = {"lat": "48 deg", "lon": "11 deg"}
+    scenario = read_scenario(mapping)
+    return scenario.simulate(seed=3, run=1), from_on(scenario.simulate_aiding(seed=3, run=1)["gnss"].record, 30.0)

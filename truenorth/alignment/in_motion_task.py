@@ -65,6 +65,7 @@ OUTPUT = 1.0  # s, of the history
 NO_LOG_ERRORS = LogErrors()
 LONGEST_ALONE = 5.0  # s, that any IMU carries a vehicle before its first aid
 USUAL_SPEED = 30.0  # m/s, of a vehicle
+UNDER_WAY = 2.0  # m/s: fixes of some metres show half of that in `PACE` of a vehicle that stands
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
@@ -294,15 +295,42 @@ def _from_the_first_aid(
     """The record from where its aiding begins, and how much of it is left out, s: nothing where the vehicle stands until then.
 
     A vehicle that drives before the first fix has neither speed nor place nor heading: no guess of the attitude leads anywhere.
+
+    Raises
+    ------
+    AlignmentError
+        Of a vehicle that drives until then, fewer seconds are aided than are needed.
     """
     begin = float(record.time[0])
     first = min(float(log.time[0]) for log in (odometer, gnss) if log is not None)
-    if first - begin < LONGEST_ALONE or record.time[-1] - first < SHORTEST:
+    if first - begin < LONGEST_ALONE:
         return record, 0.0
     motion = motion_summary(record.between(begin, first))
-    if motion.fraction("moving") + motion.fraction("rotating") == 0.0:
+    stood = motion.fraction("moving") + motion.fraction("rotating") == 0.0
+    if stood and _first_speed(odometer, gnss, first) < UNDER_WAY:
         return record, 0.0
+    aided = float(record.time[-1]) - first
+    if aided < SHORTEST:
+        raise AlignmentError(
+            f"{record.source}: only {max(aided, 0.0):.1f} s of the log are aided, and the vehicle drives before that; at least "
+            f"{SHORTEST:g} s are needed on the move"
+        )
     return record.between(first, None), first - begin
+
+
+def _first_speed(odometer: OdometerRecord | VelocityRecord | None, gnss: GnssRecord | None, first: float) -> float:
+    """By the aid that begins first, m/s.
+
+    Of a vehicle that drives straight and evenly an IMU says no more than that it is shaken.
+    """
+    if gnss is not None and (odometer is None or gnss.time[0] <= odometer.time[0]):
+        return _speed_at(gnss, first)
+    if odometer is None:
+        return 0.0
+    begun = odometer.time < first + 1.0  # a single row may be one pulse in a hundredth of a second
+    if isinstance(odometer, OdometerRecord):
+        return float(np.mean(np.abs(odometer.speed[begun])))
+    return float(np.linalg.norm(np.mean(odometer.velocity[begun], axis=0)))
 
 
 def in_body_axes(

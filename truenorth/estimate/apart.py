@@ -7,6 +7,12 @@ kilometres, and what is left of ``z - H x`` is the product of such errors: north
 their sigmas away from what the receiver measured. So innovations are what the rows say of the motion with its known errors
 taken off, exactly.
 
+The columns keep that motion's attitude, but not its velocity. Errors of velocity are small only once they are taken off: what is
+multiplied with it is a scale, a mounting, a tilt, a delay, and with a velocity that is off by 30 m/s the column ``-y`` of a wheel's
+scale is three times as long as the way of a car that does 10. Such a scale seems to be known to a third of its sigma, by metres
+that nobody drives; that of a wheel was 57 of its sigmas off. So in the rows the vehicle moves as is known: velocity, and what
+changes it (the column of a delay, in which a tilt of .05 rad leaves half a metre per second squared of gravity).
+
 That is so once the attitude is known. Of a heading that is any, errors swing by a radian within the first fixes, and end where they
 end in a filter that is linear throughout; exact innovations of such an attitude mean nothing, and a gate keeps out good fixes.
 
@@ -23,9 +29,10 @@ from truenorth.core.compiled import borrowing
 from truenorth.estimate.correct import feed_back, measure
 from truenorth.estimate.memory import Events, Memory, Model, Samples, Sources
 from truenorth.estimate.predict import describe, describe_instant
-from truenorth.state.now import NOW_BEHIND
+from truenorth.state.now import NOW_BEHIND, NOW_PUSH
 from truenorth.strapdown.wander import set_matrix
 
+_V = 4  # the place of the velocity in a state of :mod:`truenorth.strapdown.wander`
 NEAR = 0.1  # rad, one sigma of an attitude: half of its square is what the linear rows leave out
 
 
@@ -50,6 +57,8 @@ def innovations_there(
 ) -> None:
     """Put into `room.z` (3,) what measurement e is off by, the known errors taken off; the motion stays as it is.
 
+    In `room.now`, which is described already, velocity and its change become those that are known: for the columns.
+
     Parameters
     ----------
     i : int
@@ -57,7 +66,7 @@ def innovations_there(
     behind : float, s
         How long ago the stamp was.
     room : Room
-        Of the loop. All but `z` is written over, as what `w` holds of a measurement is.
+        Of the loop. All but `z` and `now` is written over, as what `w` holds of a measurement is.
     """
     source, s, aux, x, force = events.source[e], m.s, m.aux, m.x, m.means.vectors[0]
     for a in range(len(s)):
@@ -78,6 +87,7 @@ def innovations_there(
     measure(m, model, sources, source, events.measured[e], room.there, w, room.R)
     for a in range(3):
         room.z[a], force[a] = w.z[a], was[a]
+        room.now[_V + a], room.now[NOW_PUSH + a] = room.there[_V + a], room.there[NOW_PUSH + a]
     for a in range(len(s)):
         s[a] = room.s[a]
     for a in range(len(aux)):

@@ -330,9 +330,9 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
                 if retimed:
                     since = here - late.time[r]
                 exact = is_exact(model, w.P)
+                describe(m, model, now)
                 if exact:
                     innovations_there(m, model, sources, of, e, samples, i, since, w, room)
-                describe(m, model, now)
                 now[NOW_BEHIND] = since
                 if sources.instant[source]:
                     describe_instant(samples, i, m.done[0], model, m.aux, now)

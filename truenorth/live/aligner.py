@@ -58,6 +58,7 @@ KEPT = (
     "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "failure", "solutions", "_due",
 )  # fmt: skip
 NOWHERE = "no place is given, and no fix has come"
+MOVING = "the vehicle moves: more rows of the sensors that aid are waited for"
 
 
 class Aligner:
@@ -302,6 +303,9 @@ class Aligner:
             self.failure = NOWHERE
         if self._nowhere or (not aids and (self.left is not None or self._turned)):
             return
+        if not aids and any(feed.moves_now for feed in self.feeds.values()):
+            self.failure = self.failure if self.onward.solution else MOVING
+            return
         record = self._record(aids, reach(aids))
         self._newest_in = float(record.time[-1])
         self._then_due = self.log.end + (GROWTH - 1.0) * max(self.duration, FIRST)
@@ -343,6 +347,10 @@ class Aligner:
         self._newest_in, self._due = np.inf, self._then_due
         found, self.failure = ended
         if found is None:
+            before = self.onward.solution
+            # The vehicle moves, and cannot be aligned yet: that as a base it did not stay is no answer any more.
+            if before is not None and not under_way(before) and before.status == "inconsistent" and self._aids():
+                self.onward.lose()
             return
         self.solutions += 1
         if under_way(found) or (self.left is None and not self._lost(found)):

@@ -177,6 +177,11 @@ class Feed(ABC):
         lasting = np.convolve(fast, np.ones(LASTING), "valid") == LASTING
         return float(self.rows[int(np.argmax(lasting)), 0]) if lasting.any() else None
 
+    @property
+    def moves_now(self) -> bool:
+        """Whether the newest row says that the vehicle moves; that it lasts, only more rows say."""
+        return len(self.rows) > 0 and bool(self.speed_of(self.rows)[-1] > MOVES)
+
     def sources(self, altitude: str, mounting: Mounting | None, found: Mounting | None = None) -> list[Aiding]:
         """The measurements that may come, none of them there yet.
 
