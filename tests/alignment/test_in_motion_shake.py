@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness
+from truenorth.estimate.moment import as_unsure, likeliest_moment, shaken_by
 from truenorth.navigation import Mounting
 from truenorth.quality.swing import shake
 from truenorth.records import ImuRecord
@@ -17,7 +17,6 @@ from truenorth.state.track import Residuals, Track
 ARM = np.array([-0.5, -2.0, 2.0])
 PERIOD = 0.19  # s
 COURSE = [
-    {"kind": "straight", "duration": "15 s"},
     {"kind": "accelerate", "to": "25 m/s", "acceleration": "0.6 m/s^2"},
     {"kind": "turn", "angle": "25 deg", "rate": "1 deg/s"},
     {"kind": "accelerate", "to": "15 m/s", "acceleration": "0.5 m/s^2"},
@@ -145,6 +144,10 @@ def on_the_arm(sigma):
 def test_delays_that_are_known_and_antennas_that_do_not_shake_are_left_alone():
     known = Mounting(lever_arm=ARM, latency_sigma=0.01)
     assert likeliest_moment(None, None, known, 2.0 * np.pi / PERIOD).antenna is known
-    assert quickness(on_the_arm(0.0), tone(1e-2, 5.0), seen(0.0)) == 0.0
-    assert quickness(on_the_arm(0.15), tone(1e-2, 0.5), seen(0.0)) == 0.0
-    assert quickness(on_the_arm(0.15), tone(1e-2, 5.0), seen(0.0)) == pytest.approx(2.0 * np.pi * 5.0, rel=0.1)
+    assert shaken_by(on_the_arm(0.0), tone(1e-2, 5.0), seen(0.0)) is None
+    assert shaken_by(on_the_arm(0.15), tone(1e-2, 0.5), seen(0.0)) is None
+    assert shaken_by(on_the_arm(0.15), tone(1e-4, 5.0), seen(0.0)) is None
+    assert not shaken_by(on_the_arm(0.15), tone(2e-3, 5.0), seen(0.0)).seen
+    found = shaken_by(on_the_arm(0.15), tone(1e-2, 5.0), seen(0.0))
+    assert found.seen
+    assert found.quick == pytest.approx(2.0 * np.pi * 5.0, rel=0.1)

@@ -9,6 +9,9 @@ The next passes begin with the likeliest, with what is known of the delay before
 more than their likelihoods scatter are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
 hypotheses", Econometrica 57 (1989)).
 
+A shake that rows hardly show does not tell its moment. But it pushes the IMU by much more than the vehicle's way does, and of the
+mean push since the last event nothing is known of a delay: then the column of the delay has none of it.
+
 What is slower than a radian in two sigmas of the delay is found by passes one after the other (:mod:`truenorth.estimate.latency`);
 what is quicker than 10 Hz receivers do not show.
 """
@@ -38,7 +41,10 @@ from truenorth.state.track import Residuals, Track
 Array = NDArray[np.float64]
 
 TURNS = 3.0  # rad, by which the shake turns in one sigma of the delay: half a period
-SEEN = 6.0  # sigmas, in which all rows together show the shake
+FAINT, SEEN = (
+    1.0,
+    6.0,
+)  # sigmas, in which all rows together show the shake: from which on it counts, and tells its moment
 USUAL_ARM = 1.0  # m, at least, of an antenna of which nobody says where it is
 FAR = 3.5  # sigmas of the delay, as far as it is tried
 MOST = 60  # delays
@@ -57,18 +63,27 @@ class Moment(NamedTuple):
     track: Track
 
 
-def quickness(antenna: Mounting, record: ImuRecord, track: Track) -> float:
-    """How quickly an antenna shakes that is shown by estimated delays, rad/s; 0 where its receiver's velocities do not show it."""
+class Shaken(NamedTuple):
+    """How an antenna shakes."""
+
+    quick: float  # rad/s
+    seen: bool  # by its receiver's velocities, so well that they tell its moment
+
+
+def shaken_by(antenna: Mounting, record: ImuRecord, track: Track) -> Shaken | None:
+    """How an antenna shakes that is shown by estimated delays; None where it hardly does, or the delay is known."""
     rows = next((r for r in track.residuals if r.name == VELOCITIES), None)
     if antenna.latency_sigma == 0.0 or rows is None or len(rows.time) < 2:
-        return 0.0
+        return None
     until = tells_until(track)
     record = record.between(until - PART, until)
     # Of a shake at a wrong moment an arm that is estimated comes out as nothing.
     arm = np.maximum(np.abs(antenna.lever_arm), np.abs(shown_arm(track, antenna.lever_arm)))
-    size, rate = shake(track, record, np.maximum(arm, min(antenna.lever_arm_sigma, USUAL_ARM)))
+    size, quick = shake(track, record, np.maximum(arm, min(antenna.lever_arm_sigma, USUAL_ARM)))
     seen = size * math.sqrt(len(rows.time)) / float(np.nanmedian(rows.sigma))
-    return rate if seen > SEEN and rate * max(antenna.latency_sigma, LATENCY_SIGMA) > TURNS else 0.0
+    if seen < FAINT or quick * max(antenna.latency_sigma, LATENCY_SIGMA) < TURNS:
+        return None
+    return Shaken(quick, seen > SEEN)
 
 
 def tells_until(track: Track) -> float:
