@@ -53,6 +53,8 @@ def of_the_shake(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, tuple
         best = likeliest_moment(run, again, task.antenna, shaken_so.quick)
     else:
         best = Likeliest(task.antenna)
+    if not best.shown:
+        return task, found, ()
     shaken = replace(shaken, antenna=best.antenna, delay_spread=best.spread)
     try:
         return shaken, begun(shaken, found.guess, shaken.run(found.guess, gated=False)), best.evidence

@@ -14,8 +14,8 @@ from truenorth.aiding.aids import ANTENNA, LATENCY_SIGMA, WHEEL
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import differs
+from truenorth.alignment.in_motion_speed import first_speed, speed_at
 from truenorth.alignment.in_motion_start import Guess, coarse_guess, start_at
-from truenorth.core.earth import radii
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import axis_sigma, standing
@@ -69,7 +69,6 @@ UNDER_WAY = 2.0  # m/s: fixes of some metres show half of that in `PACE` of a ve
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
-PACE = 5.0  # s, over which fixes show a speed
 
 
 @dataclass(frozen=True)
@@ -307,7 +306,7 @@ def _from_the_first_aid(
         return record, 0.0
     motion = motion_summary(record.between(begin, first))
     stood = motion.fraction("moving") + motion.fraction("rotating") == 0.0
-    if stood and _first_speed(odometer, gnss, first) < UNDER_WAY:
+    if stood and first_speed(odometer, gnss, first) < UNDER_WAY:
         return record, 0.0
     aided = float(record.time[-1]) - first
     if aided < SHORTEST:
@@ -316,21 +315,6 @@ def _from_the_first_aid(
             f"{SHORTEST:g} s are needed on the move"
         )
     return record.between(first, None), first - begin
-
-
-def _first_speed(odometer: OdometerRecord | VelocityRecord | None, gnss: GnssRecord | None, first: float) -> float:
-    """By the aid that begins first, m/s.
-
-    Of a vehicle that drives straight and evenly an IMU says no more than that it is shaken.
-    """
-    if gnss is not None and (odometer is None or gnss.time[0] <= odometer.time[0]):
-        return _speed_at(gnss, first)
-    if odometer is None:
-        return 0.0
-    begun = odometer.time < first + 1.0  # a single row may be one pulse in a hundredth of a second
-    if isinstance(odometer, OdometerRecord):
-        return float(np.mean(np.abs(odometer.speed[begun])))
-    return float(np.linalg.norm(np.mean(odometer.velocity[begun], axis=0)))
 
 
 def in_body_axes(
@@ -377,23 +361,6 @@ def first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
     alt = float(gnss.alt[nearest])
     lat, lon = float(gnss.lat[nearest]), float(gnss.lon[nearest])
     apart = abs(float(gnss.time[nearest] - record.time[0])) + LATENCY_SIGMA
-    gone = apart * _speed_at(gnss, float(gnss.time[nearest]))
+    gone = apart * speed_at(gnss, float(gnss.time[nearest]))
     far, high = math.hypot(FIRST_FIX[0], gone), math.hypot(FIRST_FIX[1], gone)
     return Position(lat, lon, alt if np.isfinite(alt) else 0.0, far, high)
-
-
-def _speed_at(gnss: GnssRecord, time: float) -> float:
-    """Of a receiver at a time, m/s, by its velocity or by how far it gets in some seconds."""
-    if gnss.v_n is not None and gnss.has_velocity.any():
-        rows = np.flatnonzero(gnss.has_velocity)
-        return float(np.linalg.norm(gnss.v_n[rows[np.argmin(np.abs(gnss.time[rows] - time))], :2]))
-    rows = np.flatnonzero(gnss.has_position & (gnss.time >= time))
-    last = rows[min(int(np.searchsorted(gnss.time[rows], time + PACE)), len(rows) - 1)]
-    if last == rows[0]:
-        return 0.0
-    R_M, R_N = radii(float(gnss.lat[last]))
-    north, east = (
-        R_M * (gnss.lat[last] - gnss.lat[rows[0]]),
-        R_N * math.cos(gnss.lat[last]) * (gnss.lon[last] - gnss.lon[rows[0]]),
-    )
-    return math.hypot(north, east) / float(gnss.time[last] - gnss.time[rows[0]])

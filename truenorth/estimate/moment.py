@@ -40,12 +40,15 @@ from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
-TURNS = 3.0  # rad, by which the shake turns in one sigma of the delay: half a period
+TURNS = 3.5  # rad, by which the shake turns in one sigma of the delay: half a period and more
 FAINT, SEEN = (
     1.0,
     6.0,
 )  # sigmas, in which all rows together show the shake: from which on it counts, and tells its moment
 USUAL_ARM = 1.0  # m, at least, of an antenna of which nobody says where it is
+SHOWN = (
+    SEEN**2
+)  # twice the logarithm of a likelihood ratio; of a shake as seen as that, half a period away, twice as much
 FAR = 3.5  # sigmas of the delay, as far as it is tried
 MOST = 60  # delays
 BEGINS = 20.0  # s, in which a filter comes to know level and heading
@@ -98,6 +101,7 @@ class Likeliest(NamedTuple):
     antenna: Mounting
     spread: float = 0.0  # s, one sigma, of what else the delay may be
     evidence: tuple[Evidence, ...] = ()
+    shown: bool = True  # the receiver shows the shake
 
 
 def likeliest_moment(
@@ -123,6 +127,8 @@ def likeliest_moment(
     found = _tried((other, partial(run, other)) for other in _moments(antenna, quick))
     if not found:
         return Likeliest(antenna)
+    if not _is_shown(found, antenna, quick):
+        return Likeliest(antenna, shown=False)
     for _ in range(ROUNDS):  # a delay that is half a step off costs the first rows, until they have found it
         best, ratios = _best(found, antenna)
         later = ((_as_found(one), one.track) for one in _apart(found, ratios))
@@ -132,6 +138,21 @@ def likeliest_moment(
     # A step to either side is no knowledge of its own: the log tells the delay better than that.
     antenna = replace(best.antenna, latency=late, latency_sigma=1.0 / quick)
     return Likeliest(antenna, *_unsure(best, found, ratios))
+
+
+def _is_shown(found: Sequence[Moment], given: Mounting, quick: float) -> bool:
+    """Whether a receiver shows the shake: then half a period next to the likeliest moment it fits by far worse.
+
+    A receiver whose velocities are means over its interval, or whose antenna does not shake with an IMU on its engine, does not.
+    """
+    best, ratios = _best(found, given)
+    period = 2.0 * math.pi / quick
+    near = [r for one, r in zip(found, ratios, strict=True) if abs(_step(one, best)) < 0.75 * period]
+    return min(near) < -SHOWN
+
+
+def _step(one: Moment, other: Moment) -> float:
+    return one.antenna.latency - other.antenna.latency
 
 
 def _tried(passes: Iterable[tuple[Mounting, Callable[[], Track]]]) -> list[Moment]:

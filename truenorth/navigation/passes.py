@@ -156,6 +156,8 @@ def _of_the_shake(
         best = likeliest_moment(run, lambda other, _: run(other), antenna, shaken_so.quick)
     else:
         best = Likeliest(antenna)
+    if not best.shown:
+        return plan, given, track, []
     shaken, later = replace(shaken, delay_spread=best.spread), {**given, Gnss.key: receiver.mounted(best.antenna)}
     try:
         return shaken, later, shaken.run(shaken.sources(later), smooth=smooth), [*best.evidence]
