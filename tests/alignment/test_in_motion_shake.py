@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.estimate.moment import as_unsure, likeliest_moment, shaken_by
+from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness
 from truenorth.navigation import Mounting
 from truenorth.quality.swing import shake
 from truenorth.records import ImuRecord
@@ -76,9 +76,8 @@ def test_the_period_that_is_shown_is_found(seed, late):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate", [1.0, 5.0, 10.0])
-@pytest.mark.parametrize("amplitude", [0.03, 0.08])
-def test_periods_at_all_rates(rate, amplitude):
+@pytest.mark.parametrize(("amplitude", "rate"), [(0.08, 1.0), (0.03, 5.0), (0.08, 5.0), (0.03, 10.0), (0.08, 10.0)])
+def test_periods_at_all_rates(amplitude, rate):
     for seed, late in enumerate((0.13, -0.1, 0.05, 0.2)):
         assert np.abs(off_by(seed, late, amplitude=amplitude, rate=rate)).max() < 4.0
 
@@ -129,7 +128,8 @@ def tried(fits, worse):
 def test_one_moment_that_fits_is_taken_and_two_that_do_are_in_sigma():
     one = tried([0.1209], 1.3)
     assert one.antenna.latency == pytest.approx(0.1209, abs=0.02)
-    assert (one.spread, one.evidence) == (0.0, ())
+    assert one.spread == pytest.approx(0.1 * PERIOD / (2.0 * np.pi))  # a tenth of a radian of the shake
+    assert one.evidence == ()
     two = tried([0.1209, -0.0605], 1.3)
     assert two.spread > 0.05
     assert [item.key for item in two.evidence] == ["delay.one_of_several"]
@@ -144,10 +144,13 @@ def on_the_arm(sigma):
 def test_delays_that_are_known_and_antennas_that_do_not_shake_are_left_alone():
     known = Mounting(lever_arm=ARM, latency_sigma=0.01)
     assert likeliest_moment(None, None, known, 2.0 * np.pi / PERIOD).antenna is known
-    assert shaken_by(on_the_arm(0.0), tone(1e-2, 5.0), seen(0.0)) is None
-    assert shaken_by(on_the_arm(0.15), tone(1e-2, 0.5), seen(0.0)) is None
-    assert shaken_by(on_the_arm(0.15), tone(1e-4, 5.0), seen(0.0)) is None
-    assert not shaken_by(on_the_arm(0.15), tone(2e-3, 5.0), seen(0.0)).seen
-    found = shaken_by(on_the_arm(0.15), tone(1e-2, 5.0), seen(0.0))
-    assert found.seen
-    assert found.quick == pytest.approx(2.0 * np.pi * 5.0, rel=0.1)
+    assert quickness(on_the_arm(0.0), tone(1e-2, 5.0), seen(0.0)) == 0.0
+    assert quickness(on_the_arm(0.15), tone(1e-2, 0.5), seen(0.0)) == 0.0
+    assert quickness(on_the_arm(0.15), tone(2e-3, 5.0), seen(0.0)) == 0.0
+    assert quickness(on_the_arm(0.15), tone(1e-2, 5.0), seen(0.0)) == pytest.approx(2.0 * np.pi * 5.0, rel=0.1)
+
+
+def test_a_shake_that_no_row_shows_leaves_the_delay_open():
+    """As of a receiver whose velocities are means: each moment leaves as much."""
+    assert not tried([0.1209], 1.0).shown
+    assert tried([0.1209], 1.3).shown

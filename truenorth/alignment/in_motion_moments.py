@@ -8,7 +8,7 @@ from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.core.errors import DataError
-from truenorth.estimate.moment import Likeliest, likeliest_moment, shaken_by, tells_until
+from truenorth.estimate.moment import likeliest_moment, quickness, tells_until
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.state.evidence import Evidence
 from truenorth.state.mounting import Mounting
@@ -34,10 +34,9 @@ def two_moments(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask
 
 def of_the_shake(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, tuple[Evidence, ...]]:
     """Task and first pass with the moment that a receiver shows of an antenna that shakes; else the same ones."""
-    if task.gnss is None or (shaken_so := shaken_by(task.antenna, task.record, found.track)) is None:
+    if task.gnss is None or (quick := quickness(task.antenna, task.record, found.track)) == 0.0:
         return task, found, ()
-    shaken = replace(task, shake="shown" if shaken_so.seen else "left out")
-    end = tells_until(found.track)
+    shaken, end = replace(task, shaken=True), tells_until(found.track)
     until = end if end < task.record.time[-1] else None
 
     def run(antenna: Mounting) -> Track:
@@ -49,10 +48,7 @@ def of_the_shake(task: MovingTask, found: Pass) -> tuple[MovingTask, Pass, tuple
         guess = replace(led_back(track, back, task.spec, first), heading_sigma=first.heading_sigma)
         return replace(shaken, antenna=antenna).run(guess, gated=False, until=until)
 
-    if shaken_so.seen:
-        best = likeliest_moment(run, again, task.antenna, shaken_so.quick)
-    else:
-        best = Likeliest(task.antenna)
+    best = likeliest_moment(run, again, task.antenna, quick)
     if not best.shown:
         return task, found, ()
     shaken = replace(shaken, antenna=best.antenna, delay_spread=best.spread)

@@ -45,7 +45,7 @@ from truenorth.quality.slow_aids import (
     with_slow,
 )
 from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
-from truenorth.quality.swing import VELOCITIES, Shake, shown_arm, swing, unseen_swing, with_unseen_arm
+from truenorth.quality.swing import VELOCITIES, shown_arm, swing, unseen_swing, with_unseen_arm
 from truenorth.quality.wheel_unit import check_unit
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
@@ -102,7 +102,7 @@ class MovingTask:
     held: bool = False  # biases of the accelerometers across the vertical are taken for zero
     by_fix: bool = False  # the position is that of a fix: the IMU's but for the antenna's arm
     swing_apart: bool = False  # an arm that is estimated is not learnt from swings, of which velocities may show a part
-    shake: Shake = ""  # of an antenna that shakes more quickly than its delay was known
+    shaken: bool = False  # the antenna shakes more quickly than its delay was known
     delay_spread: float = 0.0  # s, one sigma of what else that delay may be
     sprung: bool = False  # the body goes up and down on its wheels: they do not say that it stays on the road
 
@@ -186,10 +186,10 @@ class MovingTask:
 
     def _of_swing(self, shown: list[Aiding]) -> list[Aiding]:
         """A receiver's measurements with what is known of the antenna's swing."""
-        if not (self.swing_apart or self.shake):
+        if not (self.swing_apart or self.shaken):
             return shown
         askew = float(axis_sigma(self.spec)[0].max())
-        return with_unseen_arm(shown, self.record, askew, shake=self.shake)
+        return with_unseen_arm(shown, self.record, askew, shaken=self.shaken)
 
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""

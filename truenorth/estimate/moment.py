@@ -9,9 +9,6 @@ The next passes begin with the likeliest, with what is known of the delay before
 more than their likelihoods scatter are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
 hypotheses", Econometrica 57 (1989)).
 
-A shake that rows hardly show does not tell its moment. But it pushes the IMU by much more than the vehicle's way does, and of the
-mean push since the last event nothing is known of a delay: then the column of the delay has none of it.
-
 What is slower than a radian in two sigmas of the delay is found by passes one after the other (:mod:`truenorth.estimate.latency`);
 what is quicker than 10 Hz receivers do not show.
 """
@@ -49,12 +46,14 @@ USUAL_ARM = 1.0  # m, at least, of an antenna of which nobody says where it is
 SHOWN = (
     SEEN**2
 )  # twice the logarithm of a likelihood ratio; of a shake as seen as that, half a period away, twice as much
+BY_CHANCE = 2.0  # sigmas of what such a ratio scatters by
 FAR = 3.5  # sigmas of the delay, as far as it is tried
 MOST = 60  # delays
 BEGINS = 20.0  # s, in which a filter comes to know level and heading
 PART = 240.0  # s on the move, that tell them apart
 SETS_OFF = 1.0  # m/s
 ROUNDS, FINALISTS = 2, 8  # of the likeliest, each begun with the delay that it has found
+PHASE = 0.1  # rad of a shake, by which filters of gyros and receivers, and what an engine adds, may turn it
 TINY = 1e-300
 APART = 3.0  # sigmas, by which a delay is another one than that found
 
@@ -66,27 +65,19 @@ class Moment(NamedTuple):
     track: Track
 
 
-class Shaken(NamedTuple):
-    """How an antenna shakes."""
-
-    quick: float  # rad/s
-    seen: bool  # by its receiver's velocities, so well that they tell its moment
-
-
-def shaken_by(antenna: Mounting, record: ImuRecord, track: Track) -> Shaken | None:
-    """How an antenna shakes that is shown by estimated delays; None where it hardly does, or the delay is known."""
+def quickness(antenna: Mounting, record: ImuRecord, track: Track) -> float:
+    """How quickly an antenna shakes that is shown by estimated delays, rad/s; 0 where its receiver's velocities do not show it."""
     rows = next((r for r in track.residuals if r.name == VELOCITIES), None)
     if antenna.latency_sigma == 0.0 or rows is None or len(rows.time) < 2:
-        return None
+        return 0.0
     until = tells_until(track)
     record = record.between(until - PART, until)
+    some = (rows.time > until - PART) & (rows.time < until)
     # Of a shake at a wrong moment an arm that is estimated comes out as nothing.
     arm = np.maximum(np.abs(antenna.lever_arm), np.abs(shown_arm(track, antenna.lever_arm)))
     size, quick = shake(track, record, np.maximum(arm, min(antenna.lever_arm_sigma, USUAL_ARM)))
-    seen = size * math.sqrt(len(rows.time)) / float(np.nanmedian(rows.sigma))
-    if seen < FAINT or quick * max(antenna.latency_sigma, LATENCY_SIGMA) < TURNS:
-        return None
-    return Shaken(quick, seen > SEEN)
+    seen = size * math.sqrt(np.sum(some)) / float(np.nanmedian(rows.sigma))
+    return quick if seen > SEEN and quick * max(antenna.latency_sigma, LATENCY_SIGMA) > TURNS else 0.0
 
 
 def tells_until(track: Track) -> float:
@@ -137,7 +128,8 @@ def likeliest_moment(
     late, _ = _late(best)
     # A step to either side is no knowledge of its own: the log tells the delay better than that.
     antenna = replace(best.antenna, latency=late, latency_sigma=1.0 / quick)
-    return Likeliest(antenna, *_unsure(best, found, ratios))
+    spread, evidence = _unsure(best, found, ratios)
+    return Likeliest(antenna, math.hypot(spread, PHASE / quick), evidence)
 
 
 def _is_shown(found: Sequence[Moment], given: Mounting, quick: float) -> bool:
@@ -147,8 +139,9 @@ def _is_shown(found: Sequence[Moment], given: Mounting, quick: float) -> bool:
     """
     best, ratios = _best(found, given)
     period = 2.0 * math.pi / quick
-    near = [r for one, r in zip(found, ratios, strict=True) if abs(_step(one, best)) < 0.75 * period]
-    return min(near) < -SHOWN
+    near = [(r, one) for one, r in zip(found, ratios, strict=True) if abs(_step(one, best)) < 0.75 * period]
+    worst, other = min(near, key=lambda pair: pair[0])
+    return worst < -max(SHOWN, BY_CHANCE * _scatter(best, other))
 
 
 def _step(one: Moment, other: Moment) -> float:
@@ -233,8 +226,9 @@ def _unsure(best: Moment, found: Sequence[Moment], ratios: Sequence[float]) -> t
     """By how much the delay may be another one, s, and what the others do that a log does not tell from it, by their chance."""
     late, sigma = _late(best)
     scatter = np.array([_scatter(best, one) for one in found])
-    # Of Gaussian errors a ratio of ``-d^2`` scatters by ``2 d``: one that scatters by more says that much less.
-    less = np.maximum(-np.array(ratios), TINY)
+    # Of Gaussian errors a ratio of ``-d^2`` scatters by ``2 d``: one that scatters by more says that much less. One sigma of it is
+    # granted to the others.
+    less = np.maximum(-np.array(ratios) - scatter, TINY)
     odds = np.exp(-0.5 * less / np.maximum(scatter**2 / (4.0 * less), 1.0))
     others = [
         (one, float(chance))

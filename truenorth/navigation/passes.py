@@ -13,7 +13,7 @@ from truenorth.aiding.aids import Aid, Gnss
 from truenorth.alignment.in_motion_learnt import differs
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import counted_between, delay_notes, delays_found, rate_evidence, rates_found
-from truenorth.estimate.moment import Likeliest, as_unsure, likeliest_moment, shaken_by, tells_until
+from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness, tells_until
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.estimate.slow_fit import fitted
@@ -144,18 +144,15 @@ def _of_the_shake(
     receiver = given.get(Gnss.key)
     if not isinstance(receiver, Gnss) or not (antenna := receiver.mounting):
         return plan, given, track, []
-    if (shaken_so := shaken_by(antenna, plan.record, track)) is None:
+    if (quick := quickness(antenna, plan.record, track)) == 0.0:
         return plan, given, track, []
-    shaken, open_ = replace(plan, shake="shown" if shaken_so.seen else "left out"), ungated(given)
+    shaken, open_ = replace(plan, shaken=True), ungated(given)
     short = replace(shaken, record=plan.record.between(None, tells_until(track)))
 
     def run(other: Mounting) -> Track:
         return short.run(short.sources({**open_, Gnss.key: receiver.mounted(replace(other, gate=0.0))}))
 
-    if shaken_so.seen:
-        best = likeliest_moment(run, lambda other, _: run(other), antenna, shaken_so.quick)
-    else:
-        best = Likeliest(antenna)
+    best = likeliest_moment(run, lambda other, _: run(other), antenna, quick)
     if not best.shown:
         return plan, given, track, []
     shaken, later = replace(shaken, delay_spread=best.spread), {**given, Gnss.key: receiver.mounted(best.antenna)}

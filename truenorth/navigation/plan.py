@@ -19,7 +19,7 @@ from truenorth.quality.aid_noise import louder
 from truenorth.quality.converging import with_convergence
 from truenorth.quality.slow_aids import Slow, with_slow
 from truenorth.quality.stamps import with_scatter
-from truenorth.quality.swing import Shake, with_unseen_arm
+from truenorth.quality.swing import with_unseen_arm
 from truenorth.records import ImuRecord
 from truenorth.state.state import Start
 from truenorth.state.track import Track
@@ -43,7 +43,7 @@ class Plan:
     factors: Mapping[str, Array] = field(default_factory=dict)  # of a wheel's noise, so shown
     swings: bool = False  # of an antenna at a known place, which the receiver's velocities do not show in full
     late: bool = False  # what the receiver shows late is its antenna's slow swing, too
-    shake: Shake = ""  # the antenna shakes more quickly than its delay was known: all of that swing, or none
+    shaken: bool = False  # all of that swing: the antenna shakes more quickly than its delay was known
     delay_spread: float = 0.0  # s, one sigma of what else that delay may be
     unseen: float = 0.0  # share of that swing which is in their noise
     swung: Mapping[str, Array] = field(default_factory=dict)  # what that adds to their sigmas
@@ -58,7 +58,7 @@ class Plan:
 
     def run(self, sensors: Sequence[Aiding], smooth: bool = False) -> Track:
         """Filter with these measurements; smooth once that is asked for (:meth:`Track.whole`): it takes ten times as long."""
-        shown = with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late, shake=self.shake)
+        shown = with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late, shaken=self.shaken)
         used = [*shown, *self.always]
         navigated = partial(
             navigate_track,

@@ -21,9 +21,8 @@ The rule is ours.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +40,6 @@ from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
-
-Shake = Literal["", "shown", "left out"]
 
 VELOCITIES = "GNSS velocity"
 SMOOTHED = 1.0  # s, over which a receiver takes a mean, or its interval where that is shorter
@@ -182,29 +179,28 @@ def with_unseen_arm(
     *,
     known: bool = False,
     late: bool = False,
-    shake: Shake = "",
+    shaken: bool = False,
 ) -> list[Aiding]:
     """The same sources; a receiver's velocities with the part of an estimated arm whose swing they do not show, among their states.
 
     It is as long as the arm may be, along each axis; `askew`, scale factors and misalignments of the gyros, adds to it. With
     `known`, of an arm that is known as well, where its swing is large enough to be seen in a row's noise. With `late`, a delay that
-    is estimated shows the slow swing of an earlier moment; of an antenna that shakes (`shake`) all of the swing, or
-    none of it, nor of what the shake pushes the IMU by.
+    is estimated shows the slow swing of an earlier moment; with `shaken`, all of the swing.
     """
-    return [_smoothed(s, record, askew, known, late, shake) if s.name == VELOCITIES else s for s in aiding]
+    return [_smoothed(s, record, askew, known, late, shaken) if s.name == VELOCITIES else s for s in aiding]
 
 
-def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late: bool, shake: Shake) -> Aiding:
+def _smoothed(source: Aiding, record: ImuRecord, askew: float, known: bool, late: bool, shaken: bool) -> Aiding:
     estimated = source.states.get("lever arm")
     known = known and bool(source.lever_arm.any())
-    late = (late or shake != "") and is_swung_late(source)
+    late = (late or shaken) and is_swung_late(source)
     if estimated is None and not (known or late):
         return source
     _, quick = _quick(record, source.time)
     middle = record.time - 0.5 * record.steps
-    earlier = _EARLIER[shake](record) if late else None
+    earlier = (shaken_rates if shaken else slow_rates)(record) if late else None
     at = [np.zeros_like(quick)] * 2 if earlier is None else [_at(middle, of, source.time) for of in earlier]
-    kind = SHAKEN_VELOCITY if late and shake else SMOOTHED_VELOCITY
+    kind = SHAKEN_VELOCITY if late and shaken else SMOOTHED_VELOCITY
     shown = replace(source, kind=kind, measured=np.hstack([source.measured, quick, *at]))
     if estimated is None:
         swings = np.linalg.norm(np.cross(quick, source.lever_arm), axis=1)
@@ -275,22 +271,6 @@ def shaken_rates(record: ImuRecord) -> tuple[Array, Array, Array]:
     means = _means(record, both, middle, 0.5 * SHAKEN)
     rates, forces = means[:, :3], means[:, 3:]
     return rates, np.gradient(rates, middle, axis=0) if len(middle) > 1 else np.zeros_like(rates), forces
-
-
-@remembered
-def unshaken_rates(record: ImuRecord) -> tuple[Array, Array, Array]:
-    """The same without any swing, and with forces without what is quicker than a second."""
-    forces, middle = increments(record)[1] / record.steps[:, None], record.time - 0.5 * record.steps
-    for _ in range(2):
-        forces = _means(record, forces, middle, 0.5 * SMOOTHED)
-    return np.zeros_like(forces), np.zeros_like(forces), forces
-
-
-_EARLIER: dict[Shake, Callable[[ImuRecord], tuple[Array, ...]]] = {
-    "": slow_rates,
-    "shown": shaken_rates,
-    "left out": unshaken_rates,
-}
 
 
 def _filters(time: Array) -> float:
