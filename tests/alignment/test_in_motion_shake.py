@@ -118,7 +118,7 @@ def tried(fits, worse):
     """The moment that is found where delays within .01 s of those in `fits` leave noise, and others that much more."""
 
     def run(antenna):
-        noise = np.random.default_rng(round(1e4 * antenna.latency) % 1000).standard_normal(1200)
+        noise = np.random.default_rng(0).standard_normal(1200)
         near = any(abs(antenna.latency - late) < 0.01 for late in fits)
         return seen(noise * (1.0 if near else worse), -antenna.latency)
 
