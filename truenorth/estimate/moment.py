@@ -3,14 +3,15 @@
 A filter is linear in a delay. Of a train whose body rolls by .05 deg at 5 Hz an antenna on an arm of 3 m goes to and fro by .1 m/s,
 and a delay that is known to .15 s is one of seven periods of that: in the first rows the filter takes the one that its noise
 likes, and is sure of it (70 of its sigmas off). Rows that come as often as the antenna shakes make it worse: they show a slow wave,
-which looks like a tilt. So such a log is tried with delays in steps in which the shake turns by a radian, each with a step as its
-sigma: a sum of Gaussians (H. Sorenson and D. Alspach, "Recursive Bayesian estimation using Gaussian sums", Automatica 7 (1971)).
-The next passes begin with the likeliest, with what is known of the delay beforehand. Delays that a log does not tell from it by
-more than their likelihoods scatter are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
+which looks like a tilt. So such a log is tried with delays in steps in which the shake turns by a radian, each with half a step as
+its sigma: a sum of Gaussians (H. Sorenson and D. Alspach, "Recursive Bayesian estimation using Gaussian sums", Automatica 7
+(1971)). The next passes begin with the likeliest, with what is known of the delay beforehand. Delays that a log does not tell from
+it by more than their likelihoods scatter are in sigma (Q. Vuong, "Likelihood ratio tests for model selection and non-nested
 hypotheses", Econometrica 57 (1989)).
 
-What is slower than a radian in two sigmas of the delay is found by passes one after the other (:mod:`truenorth.estimate.latency`);
-what is quicker than 10 Hz receivers do not show.
+What turns by less than half a period in a sigma of the delay is found by passes one after the other
+(:mod:`truenorth.estimate.latency`); what is quicker than 10 Hz receivers do not show. Nor do those whose velocities are means: there
+each delay fits as well, and passes find it, too.
 """
 
 from __future__ import annotations
@@ -38,14 +39,10 @@ from truenorth.state.track import Residuals, Track
 Array = NDArray[np.float64]
 
 TURNS = 3.5  # rad, by which the shake turns in one sigma of the delay: half a period and more
-FAINT, SEEN = (
-    1.0,
-    6.0,
-)  # sigmas, in which all rows together show the shake: from which on it counts, and tells its moment
+SEEN = 6.0  # sigmas, in which all rows together show the shake
 USUAL_ARM = 1.0  # m, at least, of an antenna of which nobody says where it is
-SHOWN = (
-    SEEN**2
-)  # twice the logarithm of a likelihood ratio; of a shake as seen as that, half a period away, twice as much
+# Twice the logarithm of a likelihood ratio: half a period away a shake that is seen as well as that leaves four times as much.
+SHOWN = SEEN**2
 BY_CHANCE = 2.0  # sigmas of what such a ratio scatters by
 FAR = 3.5  # sigmas of the delay, as far as it is tried
 MOST = 60  # delays
