@@ -10,8 +10,8 @@ it by more than their likelihoods scatter are in sigma (Q. Vuong, "Likelihood ra
 hypotheses", Econometrica 57 (1989)).
 
 What turns by less than half a period in a sigma of the delay is found by passes one after the other
-(:mod:`truenorth.estimate.latency`); what is quicker than 10 Hz receivers do not show. Nor do those whose velocities are means: there
-each delay fits as well, and passes find it, too.
+(:mod:`truenorth.estimate.latency`); what is quicker than 10 Hz receivers do not show. Nor do those whose velocities are means:
+there each delay fits as well, and passes find it, too.
 """
 
 from __future__ import annotations
