@@ -5,6 +5,7 @@ import pytest
 
 from tests.runs import some
 from truenorth import AlignmentError, Gnss, GnssRecord, Odometer, align
+from truenorth.alignment.in_motion_task import first_fix
 from truenorth.core.attitude import misalignment
 from truenorth.core.position import Position
 from truenorth.core.yaml_file import read_mapping
@@ -59,6 +60,21 @@ def test_a_first_fix_before_driving_off(drive):
     answer = align(made.record, None, "industrial", aid=Gnss(from_on(aids["gnss"], 20.0), ANTENNA))
     assert answer.status == "aligned", answer.reasons
     assert all(item.key != "aids.late" for item in answer.evidence)
+
+
+def test_a_first_fix_of_a_car_that_waits_and_has_driven_before(drive):
+    """The place of the beginning was as good as a car gets far at the speed of its first fix, none: all fixes were refused."""
+    made, aids = drive
+    gnss, wheel = aids["gnss"], aids["odometer"]
+    waits = gnss.time[np.argmin(np.abs(np.interp(gnss.time, wheel.time, wheel.speed)) + 99.0 * (gnss.time < 60.0))]
+    late = from_on(gnss, float(waits))
+    way = float(np.sum(wheel.distance[wheel.time < waits]))
+    begin = first_fix(made.record, late, wheel)
+    assert way > 100.0
+    assert way < begin.horizontal_sigma < 1.2 * way
+    answer = align(made.record, None, "industrial", aid=[Gnss(late, ANTENNA), Odometer(wheel)])
+    assert answer.status == "aligned", answer.reasons
+    assert np.all(off(answer, made.motion) < 4.0)
 
 
 def test_a_report_of_a_log_without_fixes_at_first():

@@ -1,4 +1,4 @@
-"""How fast a vehicle is when its aids begin, by an aid alone."""
+"""How fast a vehicle is when its aids begin, and how far it gets before that, by an aid alone."""
 
 from __future__ import annotations
 
@@ -44,6 +44,14 @@ def speed_at(gnss: GnssRecord, time: float) -> float:
         R_N * math.cos(gnss.lat[last]) * (gnss.lon[last] - gnss.lon[rows[0]]),
     )
     return math.hypot(north, east) / float(gnss.time[last] - gnss.time[rows[0]])
+
+
+def driven(log: OdometerRecord | VelocityRecord | None, begin: float, end: float) -> float:
+    """How far a sensor in body axes says that a vehicle drives between two times, m; zero without one."""
+    within = slice(0, 0) if log is None else slice(*np.searchsorted(log.time, [begin, end]))
+    if log is None or within.start == within.stop:
+        return 0.0
+    return float(np.sum(np.linalg.norm(log.way_b(np.eye(3))[within], axis=1)))
 
 
 def _unsure(gnss: GnssRecord, time: float) -> float:

@@ -14,7 +14,7 @@ from truenorth.aiding.aids import ANTENNA, LATENCY_SIGMA, WHEEL
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import differs
-from truenorth.alignment.in_motion_speed import first_speed, speed_at
+from truenorth.alignment.in_motion_speed import driven, first_speed, speed_at
 from truenorth.alignment.in_motion_start import Guess, coarse_guess, start_at
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
@@ -260,7 +260,7 @@ def moving_task(
         position = None if has_fixes(gnss) else replace(position, horizontal_sigma=far)
     by_fix = position is None and has_fixes(gnss)
     if position is None:
-        position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
+        position = first_fix(record, gnss, odometer) if has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
         check_fixes(gnss, position, float(record.time[0]))
     wheel = WHEEL if wheel is None else wheel
@@ -354,13 +354,14 @@ def has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
     return gnss is not None and bool(gnss.has_position.any())
 
 
-def first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
+def first_fix(record: ImuRecord, gnss: GnssRecord, odometer: OdometerRecord | VelocityRecord | None = None) -> Position:
     """Where a log begins, by GNSS: no farther from the nearest fix than the vehicle goes in between, and while fixes are late."""
     fixes = np.flatnonzero(gnss.has_position)
     nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
     alt = float(gnss.alt[nearest])
     lat, lon = float(gnss.lat[nearest]), float(gnss.lon[nearest])
     apart = abs(float(gnss.time[nearest] - record.time[0])) + LATENCY_SIGMA
-    gone = apart * speed_at(gnss, float(gnss.time[nearest]))
+    at = float(gnss.time[nearest])
+    gone = max(apart * speed_at(gnss, at), driven(odometer, *sorted((at, float(record.time[0])))))
     far, high = math.hypot(FIRST_FIX[0], gone), math.hypot(FIRST_FIX[1], gone)
     return Position(lat, lon, alt if np.isfinite(alt) else 0.0, far, high)
