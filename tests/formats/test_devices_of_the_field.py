@@ -196,3 +196,15 @@ def test_two_clocks_that_nothing_tells_apart_are_asked_about(tmp_path):
         read_imu(tmp_path / "log.mat")
     savemat(tmp_path / "log.mat", {"t_s": MOVED.time, "t_ms": 1e3 * MOVED.time, **IMU})
     is_read(tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize("time", ["1e248", "1e400"])
+def test_a_time_of_a_vbox_that_is_infinite(tmp_path, time):
+    """It was a warning of NumPy, and no message."""
+    path = vbo(tmp_path / "drive.vbo")
+    lines = path.read_text().splitlines()
+    k = lines.index("[data]") + 3
+    lines[k] = " ".join([lines[k].split()[0], time, *lines[k].split()[2:]])
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(DataError, match=r"drive.vbo: line \d+"):
+        read_gnss(path)

@@ -19,7 +19,7 @@ from tests.runs import some
 from truenorth.core.errors import UsageError
 from truenorth.formats import read_imu
 from truenorth.formats.layout import Layout
-from truenorth.live.decode import binary_row
+from truenorth.live.binary_rows import binary_row
 from truenorth.live.sources import open_source
 
 IMU = "sensor_msgs/msg/Imu"

@@ -21,7 +21,8 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.formats import write_imu
 from truenorth.formats.layout import Layout
-from truenorth.live.decode import Decoder, binary_row
+from truenorth.live.binary_rows import binary_row
+from truenorth.live.decode import Decoder
 from truenorth.live.journal import Journal
 from truenorth.live.outputs import nmea_lines
 from truenorth.live.remaining import seconds_to

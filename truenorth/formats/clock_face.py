@@ -25,6 +25,11 @@ def is_clock_face(raw: Array) -> bool:
 
 
 def of_clock_face(raw: Array) -> Array:
-    """Seconds of the day of numbers such as ``101259.98``; they go on after midnight."""
+    """Seconds of the day of numbers such as ``101259.98``; they go on after midnight. NaN of a number that is infinite."""
+    with np.errstate(invalid="ignore"):
+        return _seconds(raw)
+
+
+def _seconds(raw: Array) -> Array:
     time = raw // 10000.0 * 3600.0 + raw // 100.0 % 100.0 * 60.0 + raw % 100.0
     return np.asarray(time + DAY * np.concatenate([[0.0], np.cumsum(np.diff(time) < -DAY / 2)]))

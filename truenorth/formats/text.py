@@ -45,6 +45,7 @@ LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
 MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
 REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//)")
 SENTENCE = re.compile(r"\$?[A-Z]{5},.*\*[0-9A-F]{2}")
+AT_ONCE, FEW = 1 << 26, 16  # bytes and columns of a text that is read in one pass, whatever is asked for
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
 
@@ -75,6 +76,8 @@ class TextTable:
         import pyarrow as pa
 
         names = list(dict.fromkeys(wanted))
+        if (numbers := self._numbers(wanted, gaps)) is not None:
+            return numbers
         try:
             table = self._table(names, dict.fromkeys(names, pa.float64()), [""] if gaps else [])
         except pa.ArrowInvalid as error:
@@ -93,12 +96,39 @@ class TextTable:
         """
         import pyarrow as pa
 
+        if self._whole is not None:
+            return self._whole.column(str(self.names.index(name)))
         try:
             return self._table([name], {}, [""]).column("0")
         except pa.ArrowInvalid as error:
             raise self._first_fault([name], True) or DataError(
                 f"{self.path.name}: not a table of numbers ({error})"
             ) from None
+
+    @cached_property
+    def _whole(self) -> pa.Table | None:
+        """All columns in the types that their cells show; None of a long text, or one that has to be read by the column."""
+        import pyarrow as pa
+
+        if len(self.text) > AT_ONCE or len(self.names) > FEW or len(set(self.names)) < len(self.names):
+            return None
+        try:
+            return self._table(self.names, {}, [""])
+        except pa.ArrowInvalid:
+            return None
+
+    def _numbers(self, names: Sequence[str], gaps: bool) -> Array | None:
+        """Columns (N, n) of what has been read, where all of it is numbers."""
+        import pyarrow as pa
+
+        if self._whole is None:
+            return None
+        columns = [self._whole.column(str(self.names.index(name))) for name in names]
+        if not all(pa.types.is_floating(c.type) or pa.types.is_integer(c.type) for c in columns):
+            return None
+        if not gaps and any(c.null_count for c in columns):
+            return None
+        return to_numpy([c.cast(pa.float64(), safe=False) for c in columns])
 
     def place(self, row: int) -> str:
         """Where row `row` (0 is the first) stands in the file, in words."""

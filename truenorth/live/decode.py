@@ -1,15 +1,9 @@
-"""Bytes to rows: CSV lines with the documented columns, a fixed binary row, or the messages of a device.
-
-Binary row: ``TNR1``, seven little-endian float64 (time s, gyro x y z rad/s, specific force x y z m/s^2) and the CRC-32 of those 56
-bytes as little-endian uint32: 64 bytes.
-"""
+"""Bytes to rows: CSV lines with the documented columns, fixed binary rows, or the messages of a device."""
 
 from __future__ import annotations
 
-import struct
 import time as clock
-import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,22 +13,14 @@ from truenorth.core.attitude import body_axes
 from truenorth.core.errors import DataError
 from truenorth.formats.layout import Layout, unit_factor
 from truenorth.formats.names import clock_of, heading_of
+from truenorth.live.binary_rows import BinaryRows
 from truenorth.live.log import Kind
 from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
 from truenorth.records import COLUMNS
 
 Array = NDArray[np.float64]
 
-MAGIC = b"TNR1"
-PAYLOAD = struct.Struct("<7d")
-LENGTH = len(MAGIC) + PAYLOAD.size + 4
 BARE = ("time", *COLUMNS["rates"])
-
-
-def binary_row(time: float, gyro: Array, accel: Array) -> bytes:
-    """One row in the binary form."""
-    payload = PAYLOAD.pack(time, *gyro, *accel)
-    return MAGIC + payload + struct.pack("<I", zlib.crc32(payload))
 
 
 @dataclass(frozen=True)
@@ -76,7 +62,7 @@ class Decoder:
         self.others: list[Callable[[bytes], None]] = []  # sensors whose messages stand in the same stream
         self._messages: Messages | None = None
         self._half = b""
-        self._frames = False  # binary rows have come
+        self._binary = BinaryRows()
         self._columns: _Columns | None = None
         self._turn = np.eye(3) if layout.axes is None else body_axes(layout.axes)
         self.broken = 0
@@ -97,17 +83,24 @@ class Decoder:
         """
         for other in self.others:
             other(data)
-        if self._columns is None and self._messages is None and not self._frames:
-            protocol = protocol_of(self._half + data)
+        rows: Sequence[Sequence[float]] = []
+        if self._messages is None:
+            rows, data = self._binary.feed(data)
+            decided = self._binary.seen or self._columns is not None
+            protocol = None if decided else protocol_of(self._half + data)
             if protocol is not None:
-                self._messages, self._columns = Messages(protocol, self._source), None
+                data = self._half + data + self._binary.given_back()
+                self._messages = Messages(protocol, self._source)
                 self._turn = body_axes(self._layout.axes or self._messages.module.AXES)
         if self._messages is not None:
             result = self._table(self._messages.feed(data, "imu").get("imu", {}))
         else:
-            self._half += data
-            self._frames = self._frames or MAGIC in self._half
-            result = np.array(self._binary() if self._frames else self._text(), dtype=np.float64).reshape(-1, 7)
+            if self._binary.seen:  # what stands between rows is another sensor's, or nobody's
+                self.broken += bool(data) and not self.others
+            else:
+                self._half += data
+                rows = self._text()
+            result = np.array(rows, dtype=np.float64).reshape(-1, 7)
         if self._by_arrival and len(result):
             self.arrival_time = True
             result[:, 0] += self._now() - result[-1, 0]
@@ -124,20 +117,6 @@ class Decoder:
             self._columns = self._from_header(list(table))
         values = np.column_stack(list(table.values()))
         return np.ascontiguousarray(values[:, self._columns.at] * self._columns.factor)
-
-    def _binary(self) -> list[tuple[float, ...]]:
-        rows = []
-        while (start := self._half.find(MAGIC)) >= 0 and len(self._half) - start >= LENGTH:
-            frame = self._half[start : start + LENGTH]
-            payload = frame[len(MAGIC) : -4]
-            if zlib.crc32(payload) == int.from_bytes(frame[-4:], "little"):
-                self.broken += start > 0
-                rows.append(PAYLOAD.unpack(payload))
-                self._half = self._half[start + LENGTH :]
-            else:
-                self.broken += 1
-                self._half = self._half[start + 1 :]
-        return rows
 
     def _text(self) -> list[list[float]]:
         *lines, self._half = self._half.split(b"\n")

@@ -22,6 +22,7 @@ from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
 from truenorth.formats import read_encoder, read_gnss, read_height, read_master, read_odometer, read_velocity
 from truenorth.formats.magnetometer import read_magnetometer
+from truenorth.live.binary_rows import BinaryRows
 from truenorth.live.feed import Feed
 from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
 
@@ -53,7 +54,7 @@ class Listener:
     source : str
         Messages begin with it.
     shared : bool
-        The stream is another sensor's as well: lines of text are not ours.
+        The stream is the IMU's as well: lines of text and binary rows are not ours.
     by_arrival : bool
         Time is that of arrival, whatever the rows say.
     add : callable, optional
@@ -79,6 +80,7 @@ class Listener:
     ) -> None:
         self.feed, self._source, self._options, self._add = feed, source, options, add or feed.add
         self._shared, self._by_arrival = shared, by_arrival
+        self._binary = BinaryRows()
         self._half = b""
         self._messages: Messages | None = None
         self._header = b""
@@ -100,9 +102,12 @@ class Listener:
         DataError
             Text that is none of these.
         """
+        if self._shared and self._messages is None:
+            _, data = self._binary.feed(data)
         if self._messages is None and not self._header and not self._lines:
             protocol = protocol_of(self._half + data)
             if protocol is not None:
+                data = self._half + data + self._binary.given_back()
                 self._messages = Messages(protocol, self._source)
         if self._messages is not None:
             part = PARTS.get(self.feed.key, self.feed.key)
