@@ -29,6 +29,7 @@ from truenorth.formats.dialect import (
     notes_on_other_rows,
     with_points,
 )
+from truenorth.formats.header import SENTENCE, header_of
 from truenorth.formats.labelled import table_of_labels
 from truenorth.formats.line_ends import without_ends_in_quotes
 from truenorth.formats.quotes import without_outer_quotes, without_stray_quotes
@@ -44,7 +45,6 @@ LONGEST_HEAD = 1 << 22
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
 MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
 REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//)")
-SENTENCE = re.compile(r"\$?[A-Z]{5},.*\*[0-9A-F]{2}")
 AT_ONCE, FEW = 1 << 26, 16  # bytes and columns of a text that is read in one pass, whatever is asked for
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
@@ -252,7 +252,7 @@ def open_table(path: Path) -> TextTable:
     notes = tuple(said for said in (note, joined, mended) if said is not None)
     if first is None:
         return _without_rows(path, text, head, notes)
-    names, used = _header(path, dialect, head[:first], count, first_cells=dialect.cells(head[first][1]))
+    names, used = header_of(path, dialect, head[:first], count, first_cells=dialect.cells(head[first][1]))
     above = tuple(line for k, (_, line) in enumerate(head[:first]) if k not in used)
     named = bool(used)
     notes += notes_on_other_rows(path.name, dialect, head[:first], used, count)
@@ -312,79 +312,6 @@ def _are_row(dialect: Dialect, cells: Sequence[str], count: int) -> bool:
         return False
     said = [cell for cell in cells if cell]  # a spreadsheet fills up lines above a header: ``Rate,100,,,``
     return len(said) == count or dialect.share(said) > 0.5
-
-
-def _header(
-    path: Path, dialect: Dialect, above: list[tuple[int, str]], count: int, first_cells: list[str]
-) -> tuple[list[str], set[int]]:
-    """Names of the columns from the lines above the first row, and which of these lines they are."""
-    units: list[str] | None = None
-    unit_line = -1
-    for k in range(len(above) - 1, -1, -1):
-        line = above[k][1]
-        if not line.strip(",;|\t ") or SENTENCE.fullmatch(line.strip()):
-            continue  # separators and nothing between them, or what a receiver says
-        plain = line.lstrip("#%/ \t") if is_remark(line) else line
-        for delimiter in (dialect.delimiter, *DELIMITERS):
-            names = Dialect(delimiter, ".").cells(plain)
-            if 2 < len(names) < count and not any(first_cells[len(names) :]) and not all(map(dialect.is_number, names)):
-                names += [""] * (count - len(names))  # separators at the end of each row
-            if len(names) == count + 1 and not names[-1]:
-                names = names[:-1]  # a separator at the end of the header alone
-            if len(names) == count and not all(map(dialect.is_number, names)):
-                break
-        else:
-            cells = dialect.cells(line)
-            listed = dialect.delimiter is not None and not is_remark(line) and k == len(above) - 1
-            # Numbers alone are no header but a row that lacks its beginning: a logger that was switched on in its midst.
-            if listed and len(cells) >= max(3, count // 2) and dialect.share(cells) < 0.5:
-                raise DataError(
-                    f"{path.name}: line {above[k][0]}: a header of {len(cells)} columns above rows of {count}; "
-                    "expected as many of each: if commas stand both between columns and in decimals, write the log with "
-                    "another separator"
-                )
-            continue
-        if units is None and _are_units(names) and k > 0:
-            units, unit_line = names, k
-            continue
-        if units is not None:
-            names = [f"{name} [{_bare(unit)}]" if unit.strip("[]()- ") else name for name, unit in zip(names, units)]
-        if k > 0 and (whole := _of_groups(dialect.cells(above[k - 1][1]), names)):
-            return whole, {k, k - 1, unit_line}
-        return names, {k, unit_line}
-    return [], set()
-
-
-def _of_groups(groups: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Names under the cells of a spreadsheet that span several columns: ``IMU Gyroscope;;`` above ``X;Y;Z``; empty: no such line.
-
-    Only where names alone do not tell the columns apart.
-    """
-    listed = sum(map(bool, groups))
-    if len(set(names)) == len(names) or not 1 < listed < len(names) or len(groups) > len(names) + 1 or not groups[0]:
-        return []
-    whole, group = [], ""
-    for k, name in enumerate(names):
-        group = (groups[k] if k < len(groups) else "") or group
-        whole.append(f"{group} {name}".strip())
-    return whole
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a line under the header holds the units."""
-    from truenorth.formats.units import unit_in
-
-    said = [_bare(cell) for cell in cells]
-    known = [unit_in(cell) is not None or cell in ("", "-") for cell in said]
-    return sum(known) >= 0.7 * len(cells) and any(unit_in(cell) is not None and len(cell) > 1 for cell in said)
-
-
-def _bare(cell: str) -> str:
-    """A unit without the brackets around it; those inside stay: ``m/(s^2)``."""
-    cell = cell.strip()
-    while len(cell) > 1 and cell[0] + cell[-1] in ("[]", "()"):
-        cell = cell[1:-1].strip()
-    return cell
 
 
 def _without_rows(path: Path, text: bytes, head: list[tuple[int, str]], notes: tuple[str, ...]) -> TextTable:
