@@ -124,7 +124,9 @@ class TextTable:
         if self._whole is None:
             return None
         columns = [self._whole.column(str(self.names.index(name))) for name in names]
-        if not all(pa.types.is_float64(c.type) for c in columns):  # a cast would load Arrow's kernels, which takes longer
+        if not all(
+            pa.types.is_float64(c.type) for c in columns
+        ):  # a cast would load Arrow's kernels, which takes longer
             return None
         return None if any(c.null_count for c in columns) and not gaps else to_numpy(columns)
 

@@ -28,6 +28,7 @@ from truenorth.navigation.plan import Plan
 from truenorth.navigation.procedure import FINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.second_look import SENSORS
+from truenorth.quality.converging import Convergence, convergence
 from truenorth.quality.slow_aids import FIXES, LEAST_ROWS, Slow, with_slow
 from truenorth.quality.stamps import scattered_by_rows, stamp_notes, with_scatter
 from truenorth.records import ImuRecord
@@ -52,12 +53,19 @@ class Shown(NamedTuple):
     said: Sequence[Evidence] = ()
     since: float = -math.inf  # s: stamps are known to scatter in rows after this time
     mountings: Mapping[str, Mounting] = {}  # of aids that are as late as found, by their keys
+    converging: Convergence | None = None  # how the fixes of a receiver that starts up do
+
+    def with_states(self, aiding: Sequence[Aiding]) -> list[Aiding]:
+        """These measurements with states for errors that last, and for those of fixes that converge."""
+        converges = self.converging
+        known = [source if converges is None or source.name != FIXES else converges.of(source) for source in aiding]
+        return with_slow(known, self.slow)
 
     def on(self, aiding: Sequence[Aiding]) -> list[Aiding]:
         """These measurements of one aid with such errors; each by the rows up to it alone."""
         added = scattered_by_rows(aiding, self.stamps)
         known = {s.name: added[s.name] * (s.time > self.since)[:, None] for s in aiding if s.name in added}
-        return with_scatter(with_slow(aiding, self.slow), known)
+        return with_scatter(self.with_states(aiding), known)
 
 
 def next_look(last: float, begun: Sequence[float]) -> float:
@@ -80,7 +88,7 @@ def lasting_errors(
     spec: ImuSpec,
     aids: Mapping[str, Aid | None],
 ) -> Shown:
-    """Errors of aids that last, by their sources' names, how late the aids are, and how much stamps scatter.
+    """Errors of aids that last, how fixes converge, how late the aids are, and how much stamps scatter.
 
     Parameters
     ----------
@@ -97,6 +105,7 @@ def lasting_errors(
     """
     given: dict[str, Any] = {key: aid for key, aid in aids.items() if aid is not None}
     sources = [source for aid in given.values() for source in aid.sources(altitude)]
+    converging = next((convergence(source) for source in sources if source.name == FIXES), None)
     unseen = usual(source for source in sources if 0 < _seconds(source) < LEAST_ROWS)
     receiver = given.get(Gnss.key)
     if isinstance(receiver, Gnss) and receiver.mounting is not None and receiver.mounting.bias_sigma is not None:
@@ -113,9 +122,10 @@ def lasting_errors(
         if any(_seconds(source) >= LEAST_ROWS for source in sources):
             plan, track, said = with_slow_errors(plan, given, track)
     except (DataError, UsageError):  # the loop itself says what is wrong
-        return Shown(unseen)
+        return Shown(unseen, converging=converging)
     delays = delay_notes(delays_found(track, {SENSORS[key][0]: mounting for key, mounting in late.items()}))
-    return Shown(plan.slow, plan.stamps, [*delays, *stamp_notes(plan.stamps), *said], mountings=late)
+    said = [*delays, *stamp_notes(plan.stamps), *said]
+    return Shown(plan.slow, plan.stamps, said, mountings=late, converging=converging)
 
 
 def _as_late_as_shown(

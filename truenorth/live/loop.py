@@ -30,7 +30,6 @@ from truenorth.navigation.given import fed_back
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.start import force_at_rest
-from truenorth.quality.slow_aids import with_slow
 from truenorth.quality.stamps import stamp_notes, stamp_scatter
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -125,7 +124,7 @@ class Loop:
             for key, feed in feeds.items()
             for source in feed.sources(self.altitude, self.mountings.get(key), found.get(key))
         ]
-        sources = [*with_slow(asked, self.shown.slow), Aiding.disturbance("gap"), Aiding.disturbance("noise")]
+        sources = [*self.shown.with_states(asked), Aiding.disturbance("gap"), Aiding.disturbance("noise")]
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
         model = with_states(self._model(), sources)
         return Setting(model, tuple(sources), stride, every, invariant=fed_back(sources))
@@ -225,7 +224,8 @@ class Loop:
             return
         aids = {key: feed.looked_at(self.end, self.mountings.get(key)) for key, feed in feeds.items()}
         shown = lasting_errors(rows, self.start, self._model(), self.altitude, self.spec, aids)
-        if any((shown.stamps, shown.slow, shown.mountings, self.shown.slow, self.shown.mountings)):
+        before = (self.shown.slow, self.shown.mountings, self.shown.converging)
+        if shown.stamps or any((shown.slow, shown.mountings, shown.converging, *before)):
             self._take_anew(rows, shown, feeds, log)
 
     def _glance(self, feeds: Mapping[str, Feed]) -> None:

@@ -19,8 +19,10 @@ Source: A. Gelb (ed.), *Applied Optimal Estimation*, 1974, sec. 4.2: errors of a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,33 +42,58 @@ STEADY = 0.9  # of what a third of half a log has fallen by, the next third's: m
 SHORTEST = 1.0  # s, of a correlation time
 
 
+class Convergence(NamedTuple):
+    """How a receiver's fixes converge.
+
+    Attributes
+    ----------
+    settled : (3,) array, m
+        One sigma that its rows come down to.
+    until : float, s
+        The last row that has not; infinity: none has.
+    time : float, s
+        In which the error falls by e.
+    """
+
+    settled: Array
+    until: float
+    time: float
+
+    def of(self, source: Aiding) -> Aiding:
+        """A receiver's places with that error among their states."""
+        said = np.where(np.isfinite(source.sigma), source.sigma, 0.0)
+        open_ = np.sqrt(np.maximum(said**2 - self.settled**2, 0.0))
+        return replace(
+            source,
+            kind=CONVERGING_POSITION,
+            measured=np.hstack([source.measured, open_ * (source.time <= self.until)[:, None]]),
+            states={**source.states, "own": Group(CONVERGING, np.ones(3), self.time)},
+        )
+
+
 def with_convergence(aiding: Sequence[Aiding]) -> list[Aiding]:
     """The same sources; a receiver's places whose first rows are poor and say so have that error among their states."""
-    return [_converging(source) if source.name == FIXES else source for source in aiding]
+    found = [(source, convergence(source) if source.name == FIXES else None) for source in aiding]
+    return [source if converges is None else converges.of(source) for source, converges in found]
 
 
-def _converging(source: Aiding) -> Aiding:
+def convergence(source: Aiding) -> Convergence | None:
+    """How a receiver's places converge; None: their first rows are as good as any, or too few."""
     order = np.argsort(source.time, kind="stable")
     order = order[np.isfinite(source.measured[order, :2]).all(axis=1)]
-    said = source.sigma[order]
+    said, time = source.sigma[order], source.time[order]
     if "own" in source.states or len(order) < LEAST or not np.isfinite(said).all():
-        return source
+        return None
     settled = _settled(said**2)
     if np.all(said[0] <= POOR * settled):
-        return source
+        return None
     # Until all axes have come down to what they settle at; what gets worse again later is another matter. The last of it counts:
     # of a vehicle that knows its velocity to millimetres a second, a third of a fix that is lost within seconds is many sigmas.
     good = np.all(said <= GOOD * settled, axis=1)
-    first = order[: int(np.argmax(good)) if good.any() else len(order)]
-    open_ = np.zeros_like(source.sigma)
-    open_[first] = np.sqrt(np.maximum(source.sigma[first] ** 2 - settled**2, 0.0))
-    time = _lasts(source.time[order], np.linalg.norm(open_[order], axis=1))
-    return replace(
-        source,
-        kind=CONVERGING_POSITION,
-        measured=np.hstack([source.measured, open_]),
-        states={**source.states, "own": Group(CONVERGING, np.ones(3), time)},
-    )
+    first = int(np.argmax(good)) if good.any() else len(order)
+    open_ = np.linalg.norm(np.sqrt(np.maximum(said**2 - settled**2, 0.0)), axis=1)
+    open_[first:] = 0.0
+    return Convergence(settled, float(time[first - 1]) if good.any() else math.inf, _lasts(time, open_))
 
 
 def _settled(variance: Array) -> Array:
