@@ -16,11 +16,11 @@ from truenorth.estimate.latency import counted_between, delay_notes, delays_foun
 from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness, tells_until
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
-from truenorth.estimate.slow_fit import fitted
 from truenorth.navigation.given import ungated
 from truenorth.navigation.plan import Plan
 from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
-from truenorth.quality.absolute import known_as_fixes, says_size, with_open_arm
+from truenorth.navigation.under_way import fitted_under_way
+from truenorth.quality.absolute import known_as_fixes, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, noise_factors, noise_notes
 from truenorth.quality.slow_aids import FIXES, SPEEDS, slow_errors
 from truenorth.quality.stamps import scattered, stamp_notes, stamp_scatter
@@ -41,8 +41,6 @@ from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-COARSE = 1.0  # s, between predictions of a filter that looks for the receiver's errors
-PART = 900.0  # s of a log, that show them: some ten times as long as they last
 NOISE_PASSES = 4
 OF_ANY_PHASE = 2.0**0.5  # of a swing: what is predicted and what another phase of it shows count, both
 LEAST_UNSEEN = 0.3  # of a swing that a filter lost a track by
@@ -115,7 +113,7 @@ def with_slow_errors(
         track = plan.run(plan.sources(given), smooth=smooth)
     receiver = given.get(Gnss.key)
     if isinstance(receiver, Gnss) and plan.slow.keys() & {FIXES, SPEEDS}:
-        plan, more = _fitted(plan, given, receiver)
+        plan, more = fitted_under_way(plan, given, receiver, track)
         said += more
         track = plan.run(plan.sources(given), smooth=smooth)
     return plan, track, said
@@ -356,19 +354,6 @@ def _as_noisy(plan: Plan, given: dict[str, Any], track: Track, smooth: bool) -> 
         plan = replace(plan, factors=wheel)
         track = plan.run(plan.sources(given), smooth=smooth)
     return plan, track
-
-
-def _fitted(plan: Plan, given: Mapping[str, Any], receiver: Gnss) -> tuple[Plan, list[Evidence]]:
-    """The plan with slow errors of the receiver that the log's first part makes likeliest, and what is new to be said."""
-    part = plan.record.between(None, plan.record.time[0] + PART)
-    short = replace(plan, record=part, interval=max(plan.interval, COARSE), every=len(part))
-    slow, said = fitted(
-        lambda slow: (other := replace(short, slow=slow)).run(other.sources(given)),
-        plan.slow,
-        replace(plan, slow={}).sources(given),
-        said=says_size(receiver.record),
-    )
-    return replace(plan, slow=slow), said
 
 
 def delayed(plan: Plan, given: dict[str, Any], track: Track) -> dict[str, Any]:

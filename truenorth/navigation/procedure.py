@@ -48,7 +48,7 @@ from truenorth.navigation.given import (
     with_rows,
 )
 from truenorth.navigation.gyro_moment import gyros_of_another_moment
-from truenorth.navigation.passes import COARSE, filtered, quick_swing
+from truenorth.navigation.passes import filtered, quick_swing
 from truenorth.navigation.plan import Plan
 from truenorth.navigation.restarted import about_its_start
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
@@ -56,6 +56,7 @@ from truenorth.navigation.second_look import SENSORS, second_look
 from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import while_it_stands, zero_updates
+from truenorth.navigation.under_way import COARSE
 from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence

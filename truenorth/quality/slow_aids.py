@@ -72,6 +72,7 @@ KINDS = {
 }
 LEAST = 1e-3  # of the largest axis: what an axis without slow errors is given
 LEAST_ROWS = 60
+MOVES = 0.5  # m/s: an antenna that is slower stands, but for a wind
 LAGS = 5
 PIECE = 1.0  # s, over which innovations are averaged
 MOST = 6.0 / 0.6745  # times the median, of sizes: six sigmas
@@ -99,7 +100,8 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
             continue
         if any(role not in source.states for role in kind.after):
             continue  # what is taken for known, and may be wrong, is looked at first
-        seen = _wander(residuals, kind.axes)
+        moving = under_way(residuals, track)
+        seen = (None if moving is None else _wander(moving, kind.axes)) or _wander(residuals, kind.axes)
         if seen is None:
             continue
         correlation, size, of_rows = seen
@@ -110,6 +112,20 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
         found[source.name] = Lasting(Group(kind.name, sigma, kind.time, unit=residuals.unit))
         said.append(wanders(source.name, correlation, float(size.max()), residuals.unit))
     return found, said
+
+
+def under_way(residuals: Residuals, track: Track) -> Residuals | None:
+    """Those of a vehicle that moves, of a log in which it stands for long as well; None: it does the one or the other.
+
+    Multipath of an antenna that stands changes as the satellites move, within minutes: its fixes seem to have next to no noise, and
+    an error that stays. On the move it changes with the place, within seconds. Looked at as one, the rest hides what the drive shows.
+    """
+    moves = np.linalg.norm(track.v_n[:, :2], axis=1) > MOVES
+    there = np.interp(residuals.stamp, track.time, moves) > 0.5
+    if min(np.sum(there), np.sum(~there)) < LEAST_ROWS:
+        return None
+    names = ("time", "innovation", "sigma", "nis", "used", "stamp", "jumped")
+    return replace(residuals, **{name: getattr(residuals, name)[there] for name in names})
 
 
 def wanders(name: str, correlation: float, size: float, unit: str) -> Evidence:
