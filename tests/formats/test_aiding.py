@@ -378,3 +378,14 @@ def test_a_course_beyond_all_numbers_is_named(tmp_path):
     path.write_text("\n".join(["time,lat,lon,alt,speed,course", *rows]))
     with pytest.raises(DataError, match=r"row 3, column VE: inf"):
         read_gnss(path)
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["sd_e,sd_n,sd_u", "SDE,SDN,SDU", "std_east,std_north,std_up", "sigma E,sigma N,sigma D", "e-std,n-std,u-std"],
+)
+def test_standard_deviations_by_their_usual_names(tmp_path, names):
+    """They were passed over without a word: of a receiver that said how good its fixes are nobody listened."""
+    path = tmp_path / "gps.csv"
+    path.write_text(f"time,lat,lon,alt,{names}\n" + "".join(f"{k},48,11,500,1.5,2.5,3.5\n" for k in range(5)))
+    np.testing.assert_array_equal(read_gnss(path).position_sigma, np.tile([1.5, 2.5, 3.5], (5, 1)))

@@ -77,11 +77,23 @@ INDEXER = tuple(
 )
 
 
+WORDS = {"E": ("e", "east"), "N": ("n", "north"), "U": ("u", "up", "d", "down")}
+
+
 def sigmas(names: Sequence[str], dimension: str, unit: str, group: str) -> tuple[Quantity, ...]:
     """The standard deviations of columns."""
-    return tuple(
-        Quantity(f"sigma_{name}", dimension, unit, (f"{name}_sigma", f"{name}_std"), (), group) for name in names
-    )
+    return tuple(Quantity(f"sigma_{name}", dimension, unit, _deviations(name), (), group) for name in names)
+
+
+def _deviations(name: str) -> tuple[str, ...]:
+    """How the standard deviation of a column is called: ``VE_sigma``, ``sd_e``, ``std_vel_east``, ``sdve``."""
+    axis, prefixes = (name[1:], ("v", "v_", "vel_")) if name[:1] == "V" else (name, ("",))
+    called = [prefix + word for word in WORDS.get(axis, ()) for prefix in prefixes]
+    apart = [
+        form for one in called for sd in ("sigma", "std", "sd", "stdev") for form in (f"{sd}_{one}", f"{one}_{sd}")
+    ]
+    joined = [sd + one for one in called if len(one) <= len(name) for sd in ("sd", "std")]
+    return tuple(dict.fromkeys((f"{name}_sigma", f"{name}_std", *apart, *joined)))
 
 
 def read_odometer(

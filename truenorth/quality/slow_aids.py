@@ -117,8 +117,8 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
 def under_way(residuals: Residuals, track: Track) -> Residuals | None:
     """Those of a vehicle that moves, of a log in which it stands for long as well; None: it does the one or the other.
 
-    Multipath of an antenna that stands changes as the satellites move, within minutes: its fixes seem to have next to no noise, and
-    an error that stays. On the move it changes with the place, within seconds. Looked at as one, the rest hides what the drive shows.
+    Multipath of an antenna that stands changes as the satellites move, within minutes: its fixes seem to have next to no noise,
+    and an error that stays. On the move it changes with the place, within seconds. Looked at as one, the rest hides the drive.
     """
     moves = np.linalg.norm(track.v_n[:, :2], axis=1) > MOVES
     there = np.interp(residuals.stamp, track.time, moves) > 0.5
