@@ -74,9 +74,9 @@ PASSES, MORE_PASSES = 2, 6
 # turns the products of a larger error with tilts, biases and axes pass for knowledge, and level was up to seven sigmas off.
 SURE = math.radians(7.5)
 SURELY = 3.0  # sigmas of heading, within which guesses of the bank are those of one track
-# One sigma of heading from which on the earth's rate shows it by a closed loop that is too sure of it: with each correction the axes
-# of the gyros turn against north, and their biases seem to come apart from it. Cars with tactical IMUs on straight roads at 59 deg of
-# latitude, where a bias leaves 7.4 deg, had 2.9 to 4.5, and were up to 40 deg off.
+# One sigma of heading from which on a closed loop is too sure of what the earth's rate shows: with each correction the axes of the
+# gyros turn against north, and their biases seem to come apart from it. Tactical cars on straight roads at 59 deg of latitude, where
+# a bias leaves 7.4 deg, had 2.9 to 4.5, and were up to 40 deg off.
 UNSURE = math.radians(2.0)
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2

@@ -22,7 +22,7 @@ from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
 from truenorth.navigation.under_way import fitted_under_way
 from truenorth.quality.absolute import known_as_fixes, with_open_arm
 from truenorth.quality.aid_noise import LOUD, WHEEL, changed, noise_factors, noise_notes
-from truenorth.quality.slow_aids import FIXES, SPEEDS, slow_errors
+from truenorth.quality.slow_aids import FIXES, SPEEDS, slow_errors, under_way
 from truenorth.quality.stamps import scattered, stamp_notes, stamp_scatter
 from truenorth.quality.swing import (
     UNSEEN_ARM,
@@ -105,7 +105,9 @@ def with_slow_errors(
     """The plan with errors of its aids that last, as far as innovations show them, its track, and what is to be said of them."""
     said: list[Evidence] = []
     for _ in range(2):  # one sensor's may hide another's
-        slow, shown = slow_errors(track, plan.sources(given))
+        slow, shown = slow_errors(under_way(track), plan.sources(given))
+        if not slow:
+            slow, shown = slow_errors(track, plan.sources(given))
         if not slow:
             break
         plan = replace(plan, slow={**plan.slow, **slow})

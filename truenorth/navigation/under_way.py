@@ -39,9 +39,8 @@ def fitted_under_way(plan: Plan, given: Mapping[str, Any], receiver: Gnss, track
     track : Track
         So far: it says when the vehicle moves.
     """
-    drives = any(under_way(residuals, track) is not None for residuals in track.residuals)
     end = plan.record.time[0] + PART
-    if drives:
+    if under_way(track) is not track:  # it rests and drives
         moves = np.linalg.norm(track.v_n[:, :2], axis=1) > MOVES
         driven = np.cumsum(moves * np.diff(track.time, prepend=plan.start.time))
         last = min(int(np.searchsorted(driven, PART)), len(driven) - 1)
@@ -51,9 +50,7 @@ def fitted_under_way(plan: Plan, given: Mapping[str, Any], receiver: Gnss, track
 
     def run(slow: Slow) -> Track:
         other = replace(short, slow=slow)
-        found = other.run(other.sources(given))
-        seen = (under_way(residuals, track) or residuals for residuals in found.residuals)
-        return replace(found, residuals=tuple(seen)) if drives else found
+        return under_way(other.run(other.sources(given)), track)
 
     slow, said = fitted(run, plan.slow, replace(plan, slow={}).sources(given), said=says_size(receiver.record))
     return replace(plan, slow=slow), said

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import is_
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +74,7 @@ KINDS = {
 LEAST = 1e-3  # of the largest axis: what an axis without slow errors is given
 LEAST_ROWS = 60
 MOVES = 0.5  # m/s: an antenna that is slower stands, but for a wind
+BY_ROW = ("time", "innovation", "sigma", "nis", "used", "stamp", "jumped")
 LAGS = 5
 PIECE = 1.0  # s, over which innovations are averaged
 MOST = 6.0 / 0.6745  # times the median, of sizes: six sigmas
@@ -100,8 +102,7 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
             continue
         if any(role not in source.states for role in kind.after):
             continue  # what is taken for known, and may be wrong, is looked at first
-        moving = under_way(residuals, track)
-        seen = (None if moving is None else _wander(moving, kind.axes)) or _wander(residuals, kind.axes)
+        seen = _wander(residuals, kind.axes)
         if seen is None:
             continue
         correlation, size, of_rows = seen
@@ -114,18 +115,28 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
     return found, said
 
 
-def under_way(residuals: Residuals, track: Track) -> Residuals | None:
-    """Those of a vehicle that moves, of a log in which it stands for long as well; None: it does the one or the other.
+def under_way(track: Track, moving: Track | None = None) -> Track:
+    """The track with innovations of a vehicle that moves, of sources that have many of one that stands as well; else the same one.
 
     Multipath of an antenna that stands changes as the satellites move, within minutes: its fixes seem to have next to no noise,
     and an error that stays. On the move it changes with the place, within seconds. Looked at as one, the rest hides the drive.
+
+    Parameters
+    ----------
+    track : Track
+    moving : Track, optional
+        By whose speed it moves; the track's own where left out.
     """
-    moves = np.linalg.norm(track.v_n[:, :2], axis=1) > MOVES
-    there = np.interp(residuals.stamp, track.time, moves) > 0.5
-    if min(np.sum(there), np.sum(~there)) < LEAST_ROWS:
-        return None
-    names = ("time", "innovation", "sigma", "nis", "used", "stamp", "jumped")
-    return replace(residuals, **{name: getattr(residuals, name)[there] for name in names})
+    by = track if moving is None else moving
+    moves = np.linalg.norm(by.v_n[:, :2], axis=1) > MOVES
+    found = []
+    for residuals in track.residuals:
+        there = np.interp(residuals.stamp, by.time, moves) > 0.5
+        some = min(np.sum(there), np.sum(~there)) >= LEAST_ROWS
+        found.append(
+            replace(residuals, **{name: getattr(residuals, name)[there] for name in BY_ROW}) if some else residuals
+        )
+    return track if all(map(is_, found, track.residuals)) else replace(track, residuals=tuple(found))
 
 
 def wanders(name: str, correlation: float, size: float, unit: str) -> Evidence:
