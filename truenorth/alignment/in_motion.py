@@ -74,9 +74,8 @@ PASSES, MORE_PASSES = 2, 6
 # turns the products of a larger error with tilts, biases and axes pass for knowledge, and level was up to seven sigmas off.
 SURE = math.radians(7.5)
 SURELY = 3.0  # sigmas of heading, within which guesses of the bank are those of one track
-# One sigma of heading from which on a closed loop is too sure of what the earth's rate shows: with each correction the axes of the
-# gyros turn against north, and their biases seem to come apart from it. Tactical cars on straight roads at 59 deg of latitude, where
-# a bias leaves 7.4 deg, had 2.9 to 4.5, and were up to 40 deg off.
+# One sigma of heading from which on a closed loop is too sure of what the earth's rate shows: with each correction the axes of
+# the gyros turn against north, and biases seem to come apart from it. Where a bias leaves 7.4 deg it was sure of 2.9, 40 off.
 UNSURE = math.radians(2.0)
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2
@@ -222,10 +221,15 @@ def _aligned(
     if number > 1:
         spread = spread.and_more(found.used_twice, found.unsettled)
     guess, track, last = found.guess, found.track, None
-    roughly = method == "gyrocompass" and spread.and_more(found.sigma).heading > UNSURE
+    closed = spread.and_more(found.sigma).heading
+    roughly = method == "gyrocompass" and closed > UNSURE
     if passes > 1 and (roughly or (method == "motion" and has_fixes(task.gnss))):
         tell(f"pass {number + 1}")
         last = open_track(task, first, track)
+    if (
+        roughly and last is not None and float(last.sigma[-1, PHI][2]) < closed
+    ):  # one that feeds nothing back knows no more
+        last = None
     if last is not None:
         spread = bank.beyond(SURELY * float(last.sigma[-1, PHI][2]))
     elif method == "motion" and (hidden_from(task) or spread.and_more(found.sigma).heading > HIDDEN):
