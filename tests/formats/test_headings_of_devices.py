@@ -129,3 +129,14 @@ def test_fields_of_the_one_struct_of_a_file(tmp_path):
         read_gnss(tmp_path / "both.mat")
     savemat(tmp_path / "gps.mat", {"truth": fix | {"alt": np.zeros(20)}, "gps": fix})
     np.testing.assert_allclose(read_gnss(tmp_path / "gps.mat").alt, ALT)
+
+
+@pytest.mark.parametrize(("name", "scale"), [("Time Stamp", 1.0), ("UTC_Time_ms", 1e3), ("sensor timestamp [us]", 1e6)])
+def test_a_clock_as_logs_of_an_imu_call_it(tmp_path, name, scale):
+    """`Time Stamp` was a clock to the reader of the IMU, and none to that of the receiver."""
+    rows = [[1e5 + scale * t, LAT, LON, ALT] for t in TIME]
+    fixes = read_gnss(table(tmp_path / "gnss.csv", [f"{name},lat,lon,alt"], rows))
+    np.testing.assert_allclose(fixes.time - fixes.time[0], TIME)
+    path = table(tmp_path / "two.csv", [f"{name},system time,lat,lon,alt"], [[row[0], *row] for row in rows])
+    with pytest.raises(DataError, match=rf"no column of time among {name[:4]}.*system time"):
+        read_gnss(path)

@@ -23,6 +23,7 @@ from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.checks import check_finite
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
+from truenorth.formats.names import clock_of
 from truenorth.formats.units import split, unit_in
 from truenorth.records import IN_ORDER, Late
 
@@ -249,8 +250,30 @@ def understood(
 
     Where none but the clock's means anything, and the caller names none, headings are read once more: without ``gps_`` in front of
     those of a receiver, and by the names that mean a quantity in its own unit alone. A second clock is not looked for so. What is
-    then not found is looked for in the headings of one device (:func:`of_device`).
+    then not found is looked for in the headings of one device (:func:`of_device`). A clock may have any name that one of an IMU's
+    log may have, where it is the only one of them.
     """
+    found = _quantities_of(names, quantities, options, receiver)
+    if "time" in options.columns or any(
+        quantity.name == "time" for _, meanings in found for quantity, _, _ in meanings
+    ):
+        return found
+    clocks = {name: unit for name, meanings in found if not meanings for unit in _clock(name)}
+    time = [quantity for quantity in quantities if quantity.name == "time"]
+    if len(clocks) != 1 or not time:
+        return found
+    return [(name, [(time[0], 1.0, clocks[name])] if name in clocks else meanings) for name, meanings in found]
+
+
+def _clock(name: str) -> list[str | None]:
+    """The unit that the heading of a clock names, if any; empty for another heading, and for ``t`` or ``epoch``, which may be anything."""
+    is_clock, unit = clock_of(name)
+    return [unit] if is_clock and re.search("time|stamp", name, re.IGNORECASE) else []
+
+
+def _quantities_of(
+    names: Iterable[str], quantities: Sequence[Quantity], options: Options, receiver: bool
+) -> list[tuple[str, list[Meaning]]]:
     found = [(name, list(_meanings(name, quantities))) for name in names]
     if not set(options.columns) <= {"time"}:
         return found
