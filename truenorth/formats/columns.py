@@ -117,12 +117,12 @@ class Columns:
         """The error for an empty cell of a clock, with the columns that seem to be clocks as well."""
         from truenorth.formats.names import clock_of
 
-        where = f"{self.path.name}: {self.place(row)}, column {name}"
+        source, place = self.path.name, self.place(row)
         others = [other for other in self.names if other != name and clock_of(other)[0]]
         if not others:
-            return DataError(f"{where}: empty; expected a time: remove such rows")
+            return DataError(f"{source}: {place}, column {name}: empty; expected a time: remove such rows")
         return DataError(
-            f"{where}: empty; expected a time: remove such rows, or name another clock of {listed(others)}"
+            f"{source}: {place}, column {name}: empty; expected a time: remove such rows, or name another clock of {listed(others)}"
         )
 
     def _text_clock(self, name: str, cells: list[str]) -> tuple[Array, str | None]:

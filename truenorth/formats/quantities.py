@@ -266,7 +266,7 @@ def understood(
 
 
 def _clock(name: str) -> list[str | None]:
-    """The unit that the heading of a clock names, if any; empty for another heading, and for ``t`` or ``epoch``, which may be anything."""
+    """The unit that the heading of a clock names, if any; empty for others, and for ``t`` or ``epoch``, which may be anything."""
     is_clock, unit = clock_of(name)
     return [unit] if is_clock and re.search("time|stamp", name, re.IGNORECASE) else []
 
