@@ -242,16 +242,11 @@ def test_mavlink(tmp_path):
     assert_is_field(read_magnetometer(path))
 
 
-def novatel_line(name, body, tow, definition="cdba"):
-    """An ASCII log with its checksum, as an OEM7 receiver writes it; RAWIMUS has a short header.
-
-    The header names the definition of the message, which is another one for older firmware.
-    """
+def novatel_line(name, body, tow, form="cdba"):
+    """An ASCII log with its checksum, as an OEM7 receiver writes it; RAWIMUS has a short header."""
     short = name.startswith("RAWIMUS")
     head = (
-        f"{name},2300,{tow:.3f};"
-        if short
-        else f"{name},COM1,0,55.0,FINESTEERING,2300,{tow:.3f},02000020,{definition},16809;"
+        f"{name},2300,{tow:.3f};" if short else f"{name},COM1,0,55.0,FINESTEERING,2300,{tow:.3f},02000020,{form},16809;"
     )
     text = head + body
     return f"{'%' if short else '#'}{text}*{novatel_crc(text.encode()):08x}\r\n"

@@ -191,6 +191,9 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
             f"{source}: no column of time among {listed(columns.names)}; expected time in seconds: name it, in the "
             "call or a YAML file next to the log"
         )
+    if receiver and len(devices := _receivers(columns.names)) > 1:
+        taken = [device for device in devices if any(_path(label)[0] == device for label in labels.values())]
+        source += f", {' and '.join(taken)} of {', '.join(devices)}" if taken else ""
     factors = {ours: claim[0][1] for ours, claim in claims.items()}
     time, said = columns.clock(labels["time"])
     factors["time"] = 1.0 if said is not None else _of_epoch(time, factors["time"])
@@ -203,9 +206,6 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
         )
     values = {ours: table[:, numbers.index(label)] * factors[ours] for ours, label in labels.items() if ours != "time"}
     values = {"time": time * factors["time"], **values}
-    if receiver and len(devices := _receivers(columns.names)) > 1:
-        taken = [device for device in devices if any(_path(label)[0] == device for label in labels.values())]
-        source += f", {' and '.join(taken)} of {', '.join(devices)}" if taken else ""
     found = Found(source, labels, values, factors, columns.place, frozenset(options.columns), frozenset(stated))
     found.require("time")
     if said is None and "time" not in stated and factors["time"] == 1.0:
