@@ -242,11 +242,11 @@ def test_mavlink(tmp_path):
     assert_is_field(read_magnetometer(path))
 
 
-def novatel_line(name, body, tow):
+def novatel_line(name, body, tow, form="cdba"):
     """An ASCII log with its checksum, as an OEM7 receiver writes it; RAWIMUS has a short header."""
     short = name.startswith("RAWIMUS")
     head = (
-        f"{name},2300,{tow:.3f};" if short else f"{name},COM1,0,55.0,FINESTEERING,2300,{tow:.3f},02000020,cdba,16809;"
+        f"{name},2300,{tow:.3f};" if short else f"{name},COM1,0,55.0,FINESTEERING,2300,{tow:.3f},02000020,{form},16809;"
     )
     text = head + body
     return f"{'%' if short else '#'}{text}*{novatel_crc(text.encode()):08x}\r\n"
@@ -276,6 +276,44 @@ def test_novatel(tmp_path):
     assert record.time[0] == TOW
     solution = read_trajectory(path)
     assert_is_at_home(solution, 10)
+
+
+@pytest.mark.parametrize("of_place", ["7145", "b1f6", "cdba"])
+@pytest.mark.parametrize("of_velocity", ["0141", "8c02", "10a2"])
+def test_novatel_of_older_firmware(tmp_path, of_place, of_velocity):
+    """Fields have other names there: logs were refused as damaged, or had no velocity."""
+    pytest.importorskip("novatel_edie")
+    place, course = f"{LAT},{LON},{ALT - 45.0},45.0", f"{np.hypot(1, 2)},{np.degrees(np.arctan2(2, 1))}"
+    fix = f'SOL_COMPUTED,SINGLE,{place},WGS84,2.0,1.0,3.0,"",0.0,0.0,12,12,12,0,00,06,00,33'
+    lines = []
+    for k in range(5):
+        lines.append(novatel_line("BESTPOSA", fix, TOW + k, of_place))
+        moved = f"{'SOL_COMPUTED' if k else 'INSUFFICIENT_OBS'},DOPPLER_VELOCITY,0.15,0.0,{course},-0.5,0.0"
+        lines.append(novatel_line("BESTVELA", moved, TOW + k, of_velocity))
+    path = tmp_path / "log.gps"
+    path.write_text("".join(lines))
+    record = read_gnss(path)
+    np.testing.assert_allclose(record.alt, ALT)
+    np.testing.assert_allclose(record.v_n[1:], np.tile([2.0, 1.0, -0.5], (4, 1)), atol=1e-6)
+    assert np.isnan(record.v_n[0]).all()
+
+
+@pytest.mark.parametrize("definition", ["46eb", "471d", "4e14"])
+def test_heights_of_novatels_solutions_are_above_the_ellipsoid(tmp_path, definition):
+    """INSPVAX counts from mean sea level and brings the undulation, INSPVA from the ellipsoid. Those of other kinds are no rows."""
+    pytest.importorskip("novatel_edie")
+    sea, errors = f"{LAT},{LON},{ALT - 45.0},45.0", ",".join(["0.1"] * 9)
+    motion = "1.0,2.0,-0.5,1.5,-0.7,123.0"
+    lines = {"INSPVAX": [], "INSPVA": []}
+    for k in range(5):
+        ins = f"INS_SOLUTION_GOOD,INS_RTKFIXED,{sea},{motion},{errors},0,0"
+        lines["INSPVAX"].append(novatel_line("INSPVAXA", ins, TOW + k, definition))
+        lines["INSPVAX"].append(novatel_line("INSPVASDCMPA", f"2300,0,{errors},0,56,00000000,0,0", TOW + k, "c454"))
+        ins = f"2300,{TOW + k:.3f},{LAT},{LON},{ALT},{motion},INS_SOLUTION_GOOD"
+        lines["INSPVA"].append(novatel_line("INSPVAA", ins, TOW + k, "54e2"))
+    for name, of in lines.items():
+        (tmp_path / f"{name}.gps").write_text("".join(of))
+        assert_is_at_home(read_trajectory(tmp_path / f"{name}.gps"), 5)
 
 
 def test_novatel_text_without_carriage_returns(tmp_path):

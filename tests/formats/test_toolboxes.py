@@ -6,7 +6,7 @@ from scipy.io import savemat
 
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError
-from truenorth.formats import read_gnss, read_imu, read_master
+from truenorth.formats import read_gnss, read_height, read_imu, read_master
 
 TIME = np.arange(1, 301) / 100
 RNG = np.random.default_rng(4)
@@ -93,3 +93,51 @@ def test_a_struct_without_a_specification_is_no_toolboxs(tmp_path):
     record = read_imu(tmp_path / "imu.mat", units="rad/s,m/s^2")
     assert not any("NaveGo" in guess.value for guess in record.taken_for)
     np.testing.assert_array_equal(record.accel, forces)
+
+
+def records_of(**fields):
+    """A struct array with a record in each element, as MATLAB keeps it: ``imu(k).accelX``."""
+    array = np.zeros((len(TIME), 1), dtype=[(name, object) for name in fields])
+    for name, values in fields.items():
+        for k, value in enumerate(values):
+            array[k, 0][name] = value
+    return array
+
+
+@pytest.mark.parametrize("vectors", [False, True])
+def test_a_struct_array_with_a_record_in_each_element(tmp_path, vectors):
+    """It was a file without any column."""
+    rates, forces = RNG.normal(0.0, 1.0, (300, 3)), RNG.normal([0.0, 0.0, 9.81], 0.1, (300, 3))
+    whole = {"gyro": rates, "acc": forces}
+    apart = {f"{name}{axis}": values[:, k] for name, values in whole.items() for k, axis in enumerate("XYZ")}
+    array = records_of(Time=TIME, note=["moved"] * 300, **(whole if vectors else apart))
+    savemat(tmp_path / "log.mat", {"imu_data": array})
+    record = read_imu(tmp_path / "log.mat", units="rad/s,m/s^2")
+    np.testing.assert_array_equal(record.time, TIME)
+    np.testing.assert_array_equal(record.gyro, rates)
+    np.testing.assert_array_equal(record.accel, forces)
+
+
+def test_struct_arrays_of_devices_and_of_gaps(tmp_path):
+    """Arrays in each element are logs of their own; an empty field among numbers is no number."""
+    logs = np.zeros(2, dtype=[("t", object), ("gyro", object), ("acc", object)])
+    for k in range(2):
+        logs[k] = (TIME + k, np.full((300, 3), 0.01 + k), np.tile([0.0, 0.0, 9.81], (300, 1)))
+    heights = records_of(
+        t=TIME, alt=[np.zeros((0, 0)) if k == 3 else 5.0 for k in range(300)], raw=[np.zeros(k) for k in range(300)]
+    )
+    cells = np.empty(2, dtype=object)
+    cells[:] = [{"a": 1.0}, np.zeros(3)]
+    savemat(tmp_path / "log.mat", {"dev": logs, "baro": heights, "odd": cells})
+    named = {"time": "dev(2).t", "gyro": "dev(2).gyro", "accel": "dev(2).acc"}
+    record = read_imu(tmp_path / "log.mat", columns=named, units="rad/s,m/s^2")
+    np.testing.assert_array_equal(record.time, TIME + 1.0)
+    np.testing.assert_array_equal(record.gyro, 1.01)
+    with pytest.raises(DataError, match=r"log.mat: row 4, column baro.alt: nan"):
+        read_height(tmp_path / "log.mat", columns="time=baro.t,alt=baro.alt")
+
+
+def test_a_file_of_matlab_without_numbers_says_what_it_has(tmp_path):
+    savemat(tmp_path / "log.mat", {"notes": "moved", "names": np.array(["a", "b"], dtype=object)})
+    with pytest.raises(DataError, match=r"log.mat: no arrays of numbers.*notes \(char\), names \(cell\).*save"):
+        read_imu(tmp_path / "log.mat")

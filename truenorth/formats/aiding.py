@@ -55,9 +55,11 @@ BODY = (
 )
 AXES = tuple(Quantity(f"v_{axis}", "speed", "m/s", (f"v{axis}",), (), "velocity") for axis in "xyz")
 NAVIGATION = (
-    Quantity("VE", "speed", "m/s", ("v_east", "vel_e", "v_e"), ("v_west",), "velocity"),
-    Quantity("VN", "speed", "m/s", ("v_north", "vel_n", "v_n"), ("v_south",), "velocity"),
-    Quantity("VU", "speed", "m/s", ("vel_u", "v_u", "v_upward"), ("VD", "vel_d", "v_d", "v_downward"), "velocity"),
+    Quantity("VE", "speed", "m/s", ("v_east", "vel_e", "v_e", "velned_e"), ("v_west",), "velocity"),
+    Quantity("VN", "speed", "m/s", ("v_north", "vel_n", "v_n", "velned_n"), ("v_south",), "velocity"),
+    Quantity(
+        "VU", "speed", "m/s", ("vel_u", "v_u", "v_upward"), ("VD", "vel_d", "v_d", "v_downward", "velned_d"), "velocity"
+    ),
 )
 PLACE = (
     Quantity("lat", "angle", "deg", ("latitude", "location_latitude"), (), "position"),

@@ -97,7 +97,7 @@ class Columns:
         kind = column.type
         if column.null_count:
             row = next(i for i, valid in enumerate(column.is_valid().to_pylist()) if not valid)
-            raise DataError(f"{self.path.name}: {self.place(row)}, column {name}: empty; expected a time")
+            raise self._no_time(name, row)
         if pa.types.is_timestamp(kind):
             return _seconds(column, pa.timestamp("ns", kind.tz), 1e9), "dates"
         if pa.types.is_date(kind):
@@ -112,6 +112,18 @@ class Columns:
             numbers = column if pa.types.is_float64(kind) else column.cast(pa.float64(), safe=False)
             return to_numpy([numbers])[:, 0], None
         return self.read([name], False)[:, 0], None  # which names the cell that is no number
+
+    def _no_time(self, name: str, row: int) -> DataError:
+        """The error for an empty cell of a clock, with the columns that seem to be clocks as well."""
+        from truenorth.formats.names import clock_of
+
+        source, place = self.path.name, self.place(row)
+        others = [other for other in self.names if other != name and clock_of(other)[0]]
+        if not others:
+            return DataError(f"{source}: {place}, column {name}: empty; expected a time: remove such rows")
+        return DataError(
+            f"{source}: {place}, column {name}: empty; expected a time: remove such rows, or name another clock of {listed(others)}"
+        )
 
     def _text_clock(self, name: str, cells: list[str]) -> tuple[Array, str | None]:
         import pandas as pd

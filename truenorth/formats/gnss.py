@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from truenorth.records.stale import without_stale
 
 Array = NDArray[np.float64]
 
+POS_U = ("posu_e", "posu_n", "posu_d")  # what VectorNav calls the standard deviations of a place
 EARTH_FIXED = tuple(Quantity(f"ecef_{axis}", "length", "m", (), (), "ecef") for axis in "xyz")
 EARTH_FIXED_VELOCITY = tuple(Quantity(f"ecef_v{axis}", "speed", "m/s", (), (), "ecef_velocity") for axis in "xyz")
 LOCAL = (
@@ -33,7 +35,10 @@ TRACK = (
     Quantity("course", "angle", "deg", ("track", "cog", "course_over_ground")),
 )
 SIGMAS = (
-    *sigmas(["E", "N", "U"], "length", "m", "sigma"),
+    *(
+        replace(q, aliases=(*q.aliases, name))
+        for q, name in zip(sigmas(["E", "N", "U"], "length", "m", "sigma"), POS_U)
+    ),
     *sigmas(["VE", "VN", "VU"], "speed", "m/s", "sigma_velocity"),
     *sigmas([q.name for q in EARTH_FIXED], "length", "m", "sigma"),
     *sigmas([q.name for q in EARTH_FIXED_VELOCITY], "speed", "m/s", "sigma_velocity"),
@@ -130,13 +135,13 @@ def read_gnss(
         raise found.missing("time and lat, lon, alt, or VE, VN, VU")
     absent = np.full(len(found.values["time"]), np.nan)
     values = {"lat": absent, "lon": absent, "alt": absent, "v_n": track} | values | turned
-    no_fix = found.values.get("quality", absent) == 0
-    for name in ("lat", "lon", "alt", "v_n", "heading"):
-        if values.get(name) is not None and no_fix.any():
-            values[name] = np.where(no_fix if values[name].ndim == 1 else no_fix[:, None], np.nan, values[name])
     of_place, of_velocity = accuracies(found)
     values.setdefault("position_sigma", known(_or(found.stack("sigma_E", "sigma_N", "sigma_U"), of_place)))
     values.setdefault("velocity_sigma", known(_or(found.stack("sigma_VE", "sigma_VN", "sigma_VU"), of_velocity)))
+    no_fix = found.values.get("quality", absent) == 0
+    for name in ("lat", "lon", "alt", "v_n", "heading", "position_sigma", "velocity_sigma"):
+        if values.get(name) is not None and no_fix.any():
+            values[name] = np.where(no_fix if values[name].ndim == 1 else no_fix[:, None], np.nan, values[name])
     dop = known(found.stack("hdop", "vdop"))
     record: GnssRecord = made(found, GnssRecord, **values, dop=dop, quality=found.values.get("quality"))
     return without_stale(record)

@@ -1,4 +1,4 @@
-"""The names of a text's columns, from the lines above its rows: names, units below them, groups above them."""
+"""The names of a text's columns, from the lines above its rows: names, units and sources below them, groups above them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def header_of(
         A header of another number of columns.
     """
     units: list[str] | None = None
-    unit_line = -1
+    sources: list[str] | None = None
+    unit_line = source_line = -1
     for k in range(len(above) - 1, -1, -1):
         line = above[k][1]
         if not line.strip(",;|\t ") or SENTENCE.fullmatch(line.strip()):
@@ -51,11 +52,16 @@ def header_of(
         if units is None and _are_units(names) and k > 0:
             units, unit_line = names, k
             continue
+        if k > 1 and units is sources is None and _are_sources(names, dialect.cells(above[k - 1][1])):
+            sources, source_line = names, k
+            continue
+        if sources is not None:
+            names = _of_sources(names, sources)
         if units is not None:
             names = [f"{name} [{_bare(unit)}]" if unit.strip("[]()- ") else name for name, unit in zip(names, units)]
-        if k > 0 and (whole := _of_groups(dialect.cells(above[k - 1][1]), names)):
+        if sources is None and k > 0 and (whole := _of_groups(dialect.cells(above[k - 1][1]), names)):
             return whole, {k, k - 1, unit_line}
-        return names, {k, unit_line}
+        return names, {k, unit_line, source_line}
     return [], set()
 
 
@@ -72,6 +78,16 @@ def _of_groups(groups: Sequence[str], names: Sequence[str]) -> list[str]:
         group = (groups[k] if k < len(groups) else "") or group
         whole.append(f"{group} {name}".strip())
     return whole
+
+
+def _are_sources(cells: Sequence[str], above: Sequence[str]) -> bool:
+    """Whether a line under that of the units says which device each column is of: few words that come again, or none."""
+    return len(above) == len(cells) and 2 * len(set(cells) - {""}) <= len(cells) and _are_units(above)
+
+
+def _of_sources(names: Sequence[str], sources: Sequence[str]) -> list[str]:
+    """Names that several devices have, with the device in front: ``100: gps::speed``; the others as they are."""
+    return [f"{source}::{name}" if source and names.count(name) > 1 else name for name, source in zip(names, sources)]
 
 
 def _are_units(cells: Sequence[str]) -> bool:

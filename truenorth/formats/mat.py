@@ -1,5 +1,7 @@
 """MATLAB .mat of versions 4 to 7: arrays by name, fields of structs as ``trj.imu``; those of toolboxes without being asked.
 
+Of a struct array with a record in each element a field is a column: ``imu(k).accelX`` is ``imu.accelX``.
+
 SciPy's reader follows pointers of the file without a check, and ends the interpreter on some damaged ones: it runs in a
 process of its own.
 """
@@ -50,7 +52,7 @@ def variables_of(path: Path) -> dict[str, Any]:
     Raises
     ------
     DataError
-        A damaged file, or one of version 7.3.
+        A damaged file, one of version 7.3, or one without an array of numbers.
     """
     command = [sys.executable, "-I", mat_child.__file__, str(path.absolute()), str(LARGEST)]
     try:
@@ -61,9 +63,18 @@ def variables_of(path: Path) -> dict[str, Any]:
         raise DataError(
             f"{path.name}: a MATLAB 7.3 (HDF5) file; save it with save('{path.name}', ..., '-v7') and read that"
         )
+    if child.returncode == mat_child.NOTHING:
+        raise DataError(
+            f"{path.name}: no arrays of numbers in this MATLAB file; found {_said(child.stderr)}; expected arrays, structs of "
+            "arrays or struct arrays of numbers: save the columns of the sensor so (a table by table2struct(T, 'ToScalar', true))"
+        )
     if child.returncode:
-        why = child.stderr.decode(errors="replace").strip().splitlines()
-        reason = why[-1] if why else "its reader crashed"
+        reason = _said(child.stderr) or "its reader crashed"
         raise DataError(f"{path.name}: the MATLAB file is damaged or cut short ({reason}); write it anew")
     with np.load(io.BytesIO(child.stdout), allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
+
+
+def _said(errors: bytes) -> str:
+    """The last line that the reader wrote before it ended."""
+    return next(iter(errors.decode(errors="replace").strip().splitlines()[::-1]), "")

@@ -8,7 +8,8 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-TOO_NEW = 3
+TOO_NEW, NOTHING = 3, 4
+LONGEST_FIELD = 16  # numbers of one field of a record: a vector, a quaternion, a matrix of 4 by 4
 
 
 def main() -> int:
@@ -32,6 +33,9 @@ def main() -> int:
         print("or it holds an object, such as a port: save the arrays alone" if opaque else error, file=sys.stderr)
         return 1
     arrays = _flat({name: value for name, value in content.items() if not name.startswith("__")})
+    if not arrays:
+        print(", ".join(f"{name} ({kind})" for name, _, kind in whosmat(path)) or "nothing", file=sys.stderr)
+        return NOTHING
     file = io.BytesIO()
     np.savez(file, **arrays)
     sys.stdout.buffer.write(file.getvalue())
@@ -39,14 +43,41 @@ def main() -> int:
 
 
 def _flat(content: dict[str, Any]) -> dict[str, Any]:
+    """Arrays of numbers by name: the fields of a struct as ``s.field``, those of a struct array as :func:`_of_records`."""
     import numpy as np
 
     flat: dict[str, Any] = {}
     for name, value in content.items():
         if isinstance(value, dict):
             flat |= {f"{name}.{key}": inner for key, inner in _flat(value).items()}
+        elif isinstance(value, list):  # a struct array; a cell array with a struct in it comes as a list, too
+            if value and all(isinstance(element, dict) for element in value):
+                flat |= _of_records(name, value)
         elif np.asarray(value).dtype.kind in "fiub":
             flat[name] = value
+    return flat
+
+
+def _of_records(name: str, elements: list[dict[str, Any]]) -> dict[str, Any]:
+    """A struct array: a field that is one number, or a short vector, in each of its records is a column.
+
+    Where each element holds arrays, it is no record but a log of its own, and has its number as MATLAB counts: ``imu(2).t``. An
+    empty field among numbers is NaN. Fields that are now one size, now another, are left out.
+    """
+    import numpy as np
+
+    records = [_flat(element) for element in elements]
+    fields = list(dict.fromkeys(key for record in records for key in record))
+    sizes = {key: {np.size(record.get(key, ())) for record in records} for key in fields}
+    if all(max(size) > LONGEST_FIELD for size in sizes.values()):
+        return {f"{name}({k}).{key}": value for k, record in enumerate(records, 1) for key, value in record.items()}
+    flat: dict[str, Any] = {}
+    for key in fields:
+        size = max(sizes[key])
+        if sizes[key] <= {0, size} and 0 < size <= LONGEST_FIELD:
+            absent = np.full(size, np.nan)
+            rows = [np.ravel(record[key]) if np.size(record.get(key, ())) else absent for record in records]
+            flat[f"{name}.{key}"] = np.array(rows) if size > 1 else np.concatenate(rows)
     return flat
 
 

@@ -1,4 +1,4 @@
-"""Rows of an aiding log that stand after later ones: put in order within a bound, refused beyond it."""
+"""Rows of an aiding log that stand after later ones: put in order within a bound, refused beyond it. Rows written twice."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 # Messages of several sensors overtake each other by what a link or an acoustic fix takes; a clock that was set back, or a
 # second log that was appended, goes farther and cannot be put in order.
 LONGEST_LATE = 10.0  # s
+MOST_TWICE = 0.2  # of the rows: more than this is a clock of few digits, whose rows may be samples of their own
 
 
 def put_in_order(
@@ -62,14 +63,31 @@ def put_in_order(
     return order, late
 
 
+def without_repeats(found: Found) -> Found:
+    """A log without rows that are, in time and in all that is read, the row before: a logger wrote those twice.
+
+    As it is where many are so.
+    """
+    time = found.values["time"]
+    same = np.diff(time) == 0.0
+    for column in found.values.values() if same.any() else ():
+        same &= (column[1:] == column[:-1]) | (np.isnan(column[1:]) & np.isnan(column[:-1]))
+    if len(found.values) < 2 or not same.any() or np.mean(same) > MOST_TWICE:
+        return found
+    keep = np.flatnonzero(np.concatenate([[True], ~same]))
+    values = {name: column[keep] for name, column in found.values.items()}
+    return replace(found, values=values, place=lambda row: found.place(int(keep[row])))
+
+
 def ordered(found: Found) -> Found:
-    """A log whose rows stand in order of time.
+    """A log whose rows stand in order of time, each once.
 
     Raises
     ------
     DataError
         As for :func:`put_in_order`.
     """
+    found = without_repeats(found)
     order, late = put_in_order(found.values["time"], found.labels["time"], found.source, found.place)
     if order is None:
         return found

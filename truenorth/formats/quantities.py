@@ -23,6 +23,7 @@ from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.checks import check_finite
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
+from truenorth.formats.names import clock_of
 from truenorth.formats.units import split, unit_in
 from truenorth.records import IN_ORDER, Late
 
@@ -31,6 +32,10 @@ Array = NDArray[np.float64]
 LONG_STEP = 100.0  # s: sensors that aid seldom wait so long
 FASTEST = 1000.0  # m/s, of what carries a receiver
 RECEIVER = re.compile(r"(?:gps|gnss)[_ .-]", re.IGNORECASE)  # in front of all headings of a receiver: ``gps_lat``
+RECEIVERS = re.compile(
+    r"(?:\d+: ?)?(?:gps|gnss)(?![a-z])", re.IGNORECASE
+)  # devices: ``GNSS1``, RaceChrono's ``100: gps``
+PATH = re.compile(r"::|[./]")  # between a device and what it measures
 
 
 @dataclass(frozen=True)
@@ -186,6 +191,9 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
             f"{source}: no column of time among {listed(columns.names)}; expected time in seconds: name it, in the "
             "call or a YAML file next to the log"
         )
+    if receiver and len(devices := _receivers(columns.names)) > 1:
+        taken = [device for device in devices if any(_path(label)[0] == device for label in labels.values())]
+        source += f", {' and '.join(taken)} of {', '.join(devices)}" if taken else ""
     factors = {ours: claim[0][1] for ours, claim in claims.items()}
     time, said = columns.clock(labels["time"])
     factors["time"] = 1.0 if said is not None else _of_epoch(time, factors["time"])
@@ -241,24 +249,91 @@ def understood(
     """What each heading may mean.
 
     Where none but the clock's means anything, and the caller names none, headings are read once more: without ``gps_`` in front of
-    those of a receiver, and by the names that mean a quantity in its own unit alone. A second clock is not looked for so.
+    those of a receiver, and by the names that mean a quantity in its own unit alone. A second clock is not looked for so. What is
+    then not found is looked for in the headings of one device (:func:`of_device`). A clock may have any name that one of an IMU's
+    log may have, where it is the only one of them.
     """
-    found = [(name, list(_meanings(name, quantities))) for name in names]
-    if options.columns or any(quantity.name != "time" for _, meanings in found for quantity, _, _ in meanings):
+    found = _quantities_of(names, quantities, options, receiver)
+    if "time" in options.columns or any(
+        quantity.name == "time" for _, meanings in found for quantity, _, _ in meanings
+    ):
         return found
-    others = [quantity for quantity in quantities if quantity.name != "time"]
+    clocks = {name: unit for name, meanings in found if not meanings for unit in _clock(name)}
+    time = [quantity for quantity in quantities if quantity.name == "time"]
+    if len(clocks) != 1 or not time:
+        return found
+    return [(name, [(time[0], 1.0, clocks[name])] if name in clocks else meanings) for name, meanings in found]
 
-    def once_more(name: str) -> Iterable[Meaning]:
-        if receiver and RECEIVER.match(name):
-            yield from _meanings(RECEIVER.sub("", name, count=1), others)
-        plain, unit = split(name)
-        written = None if unit is None else unit_in(unit)
-        dimension = None if written is None else parse_unit(written)[1]
-        for quantity in others:
-            if _key(plain) in quantity.otherwise and dimension == DIMENSIONS[quantity.dimension][0]:
-                yield quantity, 1.0, unit
 
-    return [(name, meanings or list(once_more(name))) for name, meanings in found]
+def _clock(name: str) -> list[str | None]:
+    """The unit that the heading of a clock names, if any; empty for others, and for ``t`` or ``epoch``, which may be anything."""
+    is_clock, unit = clock_of(name)
+    return [unit] if is_clock and re.search("time|stamp", name, re.IGNORECASE) else []
+
+
+def _quantities_of(
+    names: Iterable[str], quantities: Sequence[Quantity], options: Options, receiver: bool
+) -> list[tuple[str, list[Meaning]]]:
+    found = [(name, list(_meanings(name, quantities))) for name in names]
+    if not set(options.columns) <= {"time"}:
+        return found
+    if not options.columns and not _beyond_time(found):
+        others = [quantity for quantity in quantities if quantity.name != "time"]
+        found = [(name, meanings or list(_once_more(name, others, receiver))) for name, meanings in found]
+    known = {quantity.name for _, meanings in found for quantity, _, _ in meanings} | set(options.columns)
+    if not receiver and _beyond_time(found):
+        return found
+    more = of_device([name for name, _ in found], [q for q in quantities if q.name not in known], receiver)
+    return [(name, meanings or more.get(name, [])) for name, meanings in found]
+
+
+def _beyond_time(found: Iterable[tuple[str, list[Meaning]]]) -> bool:
+    return any(quantity.name != "time" for _, meanings in found for quantity, _, _ in meanings)
+
+
+def _once_more(name: str, quantities: Sequence[Quantity], receiver: bool) -> Iterable[Meaning]:
+    """What a heading means without a receiver's name in front, or by its unit."""
+    if receiver and RECEIVER.match(name):
+        yield from _meanings(RECEIVER.sub("", name, count=1), quantities)
+    plain, unit = split(name)
+    written = None if unit is None else unit_in(unit)
+    dimension = None if written is None else parse_unit(written)[1]
+    for quantity in quantities:
+        if _key(plain) in quantity.otherwise and dimension == DIMENSIONS[quantity.dimension][0]:
+            yield quantity, 1.0, unit
+
+
+def of_device(names: Sequence[str], quantities: Sequence[Quantity], receiver: bool) -> dict[str, list[Meaning]]:
+    """What headings mean that are paths with a device in front: ``GNSS1::PosLla::latitude [deg]``, a struct's field ``fix.lat``.
+
+    Of a table of several devices only a receiver's are known, by its name; of receivers that are numbered the first is taken. Where
+    all headings are those of one device its name does not matter.
+    """
+    paths = {name: parts for name in names if len(parts := _path(name)) > 1}
+    devices = {parts[0] for parts in paths.values()}
+    receivers = _receivers(names) if receiver else []
+    numbered = len({re.sub(r"\d+$", "", device) for device in receivers}) == 1
+    chosen = (
+        receivers[:1] if numbered else receivers or (devices if len(devices) == 1 and len(paths) == len(names) else ())
+    )
+    found: dict[str, list[Meaning]] = {}
+    for name, parts in paths.items():
+        if parts[0] in chosen:
+            unit = split(name)[1]
+            ends = [part if unit is None else f"{part} [{unit}]" for part in ("_".join(parts[-2:]), parts[-1])]
+            found[name] = next((means for end in ends if (means := list(_meanings(end, quantities)))), [])
+    return found
+
+
+def _path(name: str) -> list[str]:
+    """The parts of a heading that is a path; one part of any other."""
+    return [part.strip() for part in PATH.split(split(name)[0]) if part.strip()]
+
+
+def _receivers(names: Sequence[str]) -> list[str]:
+    """The receivers whose names stand in front of headings, the first one first."""
+    found = {parts[0] for name in names if len(parts := _path(name)) > 1 and RECEIVERS.match(parts[0])}
+    return sorted(found, key=lambda device: (len(device), device))
 
 
 def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[Meaning]:

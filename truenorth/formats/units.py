@@ -16,7 +16,7 @@ WRITTEN = {
     "micros": "us", "microseconds": "us", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns", "rad_s": "rad/s", "rads": "rad/s",
     "radps": "rad/s", "deg_s": "deg/s", "degs": "deg/s", "degps": "deg/s", "deg_h": "deg/h", "degph": "deg/h", "gs": "g",
     "radians": "rad", "milli_g": "mg", "gal": "cm/s^2", "nanosec": "ns", "microsec": "us", "millisec": "ms",
-    "kts": "kn", "mph": "mi/h",
+    "kts": "kn", "mph": "mi/h", "unix time": "s",
     "x8004": "g", "x8005": "rad/s", "x8007": "rad", "x8008": "g*s",  # fields of MicroStrain's packets, as its CSV names them
 }  # fmt: skip
 

@@ -2,6 +2,10 @@
 
 RAWIMU holds counts, whose size depends on the IMU: the reader asks for it. The second axis is written with the other sign, and z
 first (OEM7 commands and logs reference manual); here they are x, y, z of the IMU.
+
+A receiver's firmware decides how the fields of a message are called, and the header says which definition it is: a field has all
+its names here. Heights of BESTPOS and INSPVAX are above mean sea level, whatever they are called, and the undulation comes along;
+those of INSPVA are above the ellipsoid, without one.
 """
 
 from __future__ import annotations
@@ -20,6 +24,10 @@ Array = NDArray[np.float64]
 EXTRA = "novatel"
 AXES = "RFU"
 LONGEST_LINE = 4096  # bytes, of a log of text
+COUNTS = ("RAWIMU", "RAWIMUS", "RAWIMUX", "RAWIMUSX")
+# Not by their beginnings: INSPVACMP is in units of its own, INSPVASDCMP and BESTVELX hold other fields.
+SOLUTIONS = ("INSPVA", "INSPVAS", "INSPVAX")
+READ = (*COUNTS, "BESTPOS", "BESTVEL", *SOLUTIONS)
 
 
 def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
@@ -31,20 +39,19 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
     rows: dict[str, list[list[float]]] = {"imu": [], "place": [], "velocity": [], "poses": []}
     for message in _text_messages(path) if _has_bare_lines(path) else oem.FileParser(str(path)):
         name = getattr(message, "name", "")
-        values = message.to_dict() if name.startswith(("RAWIMU", "BESTPOS", "BESTVEL", "INSPVA")) else None
-        if values is None:
+        if name not in READ:
             continue
+        values = message.to_dict()
         tow = float(values["header"].get("milliseconds", 0.0)) * 1e-3
-        if name.startswith("RAWIMU"):
+        if name in COUNTS:
             rows["imu"].append([float(values["gps_seconds"]), *_counts(values)])
-        elif name.startswith("BESTPOS") and _solved(values):
-            height = float(values["orthometric_height"]) + float(values["undulation"])
+        elif name == "BESTPOS" and _solved(values):
             sigmas = [float(values[f"{key}_std_dev"]) for key in ("longitude", "latitude", "height")]
-            rows["place"].append([tow, float(values["latitude"]), float(values["longitude"]), height, *sigmas])
-        elif name.startswith("BESTVEL") and _solved(values):
+            rows["place"].append([tow, float(values["latitude"]), float(values["longitude"]), _height(values), *sigmas])
+        elif name == "BESTVEL" and _solved(values):
             speed, course = float(values["horizontal_speed"]), np.radians(float(values["ground_track"]))
             rows["velocity"].append([tow, speed * np.sin(course), speed * np.cos(course), float(values["z"])])
-        elif name.startswith("INSPVA"):
+        elif name in SOLUTIONS:
             rows["poses"].append(_pose(values, tow))
     return {"imu": _imu(rows["imu"]), "gnss": _gnss(rows["place"], rows["velocity"]), "poses": _poses(rows["poses"])}
 
@@ -68,7 +75,17 @@ def _text_messages(path: Path) -> Iterator[Any]:
 
 
 def _solved(values: dict[str, Any]) -> bool:
-    return int(values.get("solution_status", values.get("status", 1))) == 0
+    return int(_field(values, "solution_status", "status", "velocity_status")) == 0
+
+
+def _field(values: dict[str, Any], *names: str) -> Any:
+    """A field that definitions of a message call by different names."""
+    return values[next((name for name in names if name in values), names[0])]
+
+
+def _height(values: dict[str, Any]) -> float:
+    """The height above the ellipsoid: where the undulation comes along, the height is above mean sea level."""
+    return float(_field(values, "orthometric_height", "height")) + float(values.get("undulation", 0.0))
 
 
 def _counts(values: dict[str, Any]) -> list[float]:
@@ -80,9 +97,8 @@ def _counts(values: dict[str, Any]) -> list[float]:
 
 
 def _pose(values: dict[str, Any], tow: float) -> list[float]:
-    up = values["height"] if "height" in values else values["orthometric_height"] + values["undulation"]
     names = ("latitude", "longitude", "", "east_vel", "north_vel", "up_vel", "roll", "pitch", "azimuth")
-    return [float(values.get("seconds", tow)), *(float(values[name]) if name else float(up) for name in names)]
+    return [float(values.get("seconds", tow)), *(float(values[name]) if name else _height(values) for name in names)]
 
 
 def _imu(rows: list[list[float]]) -> dict[str, Array]:
