@@ -14,6 +14,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.formats.behaviour import (
     JUDGED,
+    LARGEST_RATE,
     SURE_GYRO,
     GyroFacts,
     Reading,
@@ -30,7 +31,7 @@ from truenorth.formats.choice import choose
 from truenorth.formats.chosen import Choice
 from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
-from truenorth.formats.counts import counts_above, orientation_above
+from truenorth.formats.counts import counts_above, device_above, orientation_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.formats.names import heading_of, plain
@@ -74,6 +75,7 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
     said_above = _said_above(columns, layout, choice, accel)
     choice.units = {**said_above, **choice.units}
+    choice.device |= device_above(columns.above, choice.labels[1:4])
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
     kind, units = _units(time, gyro, accel, layout, choice, said_above, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
@@ -220,7 +222,9 @@ def _units(
 
 
 def _contradicts(facts: GyroFacts, unit: str) -> bool:
-    """Whether gyros in the unit that their device writes turn gravity too far, or not enough, for any error of theirs."""
+    """Whether gyros in the unit that their device writes turn too fast, or turn gravity too far, or not enough, for any error."""
+    if facts.largest * size(unit) > 2.0 * LARGEST_RATE:
+        return True
     return facts.turned and abs(np.log(facts.turning.best_scale * size(unit))) > CONTRADICTED
 
 

@@ -45,6 +45,7 @@ LONGEST_HEAD = 1 << 22
 LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")  # and its end
 MONITOR = re.compile(rb"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> ?", re.MULTILINE)
 REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//)")
+MINUS_ZERO = re.compile(rb"-0+(?![\d.])")
 AT_ONCE, FEW = 1 << 26, 16  # bytes and columns of a text that is read in one pass, whatever is asked for
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 
@@ -128,6 +129,8 @@ class TextTable:
             return None
         if not gaps and any(c.null_count for c in columns):
             return None
+        if any(pa.types.is_integer(c.type) for c in columns) and MINUS_ZERO.search(self.text, self.begin) is not None:
+            return None  # whole numbers have no such sign
         return to_numpy([c.cast(pa.float64(), safe=False) for c in columns])
 
     def place(self, row: int) -> str:
