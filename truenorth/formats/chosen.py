@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
 from truenorth.formats.names import clock_of, is_plain_clock, plain
+from truenorth.formats.units import split
 from truenorth.records import Guess
 from truenorth.records.imu import Kind
 
@@ -30,6 +32,12 @@ FRACTIONS = {
     1e-3: re.compile(r"(?i)(?:^|[^a-z])(?:milli_?seconds?|millis|msecs?)(?:_elapsed)?$"),
     1e-6: re.compile(r"(?i)(?:^|[^a-z])(?:micro_?seconds?|micros|usecs?)(?:_elapsed)?$"),
 }
+COUNTER = re.compile(  # names of what counts rows, or packets of all kinds
+    r"(?:^|_)(?:packets?|pkt|counter|counts?|cnt|ctr|ind(?:ex|ices)|idx|numbers?|num|no|nr|seq\w*|frames?|samples?|rows?|lines?|records?|"
+    r"rec|msgs?|messages?|ids?|n)(?:_?\d+)?(?:_|$)"
+)
+OF_TIME = re.compile(r"(?i)time|stamp|[^a-z]ms|(?:^|[^a-z])t(?:[^a-z]|$)")
+FEW = 2.0  # whole steps, up to which numbers without a name may be counts with some left out, or ms
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
 
@@ -47,6 +55,7 @@ class Choice:
     fraction: float = 1e-9  # s, that the second column of the time counts
     # units, and why, that the device which wrote the log always has: what the headings name wins
     device: dict[str, tuple[str, str]] = field(default_factory=dict)
+    counter: str = ""  # a column that increases as a clock does, and by its name counts
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -218,17 +227,41 @@ def _stands(columns: Columns, name: str) -> bool:
     return bool(np.all(time == time[0]))
 
 
+def _counts(columns: Columns, name: str, time: Array) -> bool:
+    """Whether a column that increases counts rows, or by its name packets of all kinds, of which some are no rows."""
+    steps = np.diff(time)
+    if np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name):
+        return True
+    named = columns.named and COUNTER.search(plain(split(name)[0])) is not None and OF_TIME.search(name) is None
+    dated = any(EPOCH[0] < time[0] * size < EPOCH[1] for size in (1.0, 1e-3, 1e-6, 1e-9))
+    return named and bool(np.all(time == np.round(time))) and not dated
+
+
+def _check_skips(columns: Columns, choice: Choice, name: str) -> None:
+    """Ask of whole numbers that go up by 1, now and then by more: ms of a quick log, or a counter that leaves out some."""
+    time, said = columns.clock(name)
+    steps = np.diff(time)
+    whole = said is None and bool(np.all(steps == np.round(steps)))
+    if not whole or steps.min() != 1.0 or np.median(steps) > FEW or OF_TIME.search(name) is not None:
+        return
+    raise UnsureError(
+        f"{columns.path.name}: column {name} goes up by 1 to {steps.max():.0f} from row to row: it may be in ms "
+        f"({1e3 / np.mean(steps):.4g} rows a second) or count rows or packets, of which some are missing",
+        [{"columns": {"time": name}, "units": {"time": "ms"}}, {"rate": "(rows a second)"}], choice.guesses,
+    )  # fmt: skip
+
+
 def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
     """Take the only column that increases steadily for the clock; a row counter is not a clock."""
     found = []
     for name in names[:MOST_COLUMNS]:
         scatter = _scatter(columns, name)
         if scatter is not None and scatter < STEADY:
-            steps = np.diff(columns.clock(name)[0])
-            counts = np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name)
-            found.append((name, bool(counts)))
+            found.append((name, _counts(columns, name, columns.clock(name)[0])))
     clocks = _own(columns, choice, _as_long(columns, choice, [name for name, counts in found if not counts]))
+    choice.counter = next((name for name, counts in found if counts and columns.named), "")
     if len(clocks) == 1:
+        _check_skips(columns, choice, clocks[0])
         choice.time = (clocks[0],)
         choice.guesses.append(
             Guess(

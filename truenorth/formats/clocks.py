@@ -39,7 +39,7 @@ def clock_of_log(
     """Time in seconds: from the stamps, or made from the rate."""
     source = columns.path.name
     if not choice.time:
-        return _made(columns, layout, rows, guesses), layout
+        return _made(columns, layout, rows, guesses, choice.counter), layout
     raw, said = columns.clock(choice.time[0])
     if len(choice.time) == 2:
         raw = raw + choice.fraction * columns.read([choice.time[1]], False)[:, 0]
@@ -108,7 +108,7 @@ def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:
     return take("unit of time", readings, options, source, guesses).unit
 
 
-def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> Array:
+def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess], counter: str) -> Array:
     """Time of a log without any: the first row's interval ends at ``1 / rate``."""
     rate = layout.rate
     if rate is None:
@@ -123,8 +123,9 @@ def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> 
     elif rate is None:
         above = rate_above(columns)
         if above is None:
+            counted = f": column {counter!r} counts rows or packets" if counter else ""
             raise UsageError(
-                f"{columns.path.name}: no time in the log; name its column (columns: {{time: ...}}) or give the rate"
+                f"{columns.path.name}: no time in the log{counted}; name its column (columns: {{time: ...}}) or give the rate"
             )
         rate, line = above
         guesses.append(Guess("rate", f"{rate:g} Hz", f"the line {line!r} above the table", 1.0, {"rate": rate}))
