@@ -67,3 +67,12 @@ def test_a_log_that_contradicts_its_program_is_asked_about(tmp_path):
     _, gyro, accel = (part[700:4700] for part in waved(1))
     with pytest.raises(UnsureError, match=r"not sure: deg/s"):
         read_imu(write(tmp_path / "MT.txt", gyro / DEG, accel / G, MT_MANAGER))
+
+
+def test_the_app_sensor_logger_writes_rad_per_second(tmp_path):
+    time, gyro, accel = walking(2)
+    for name, values in (("Gyroscope", gyro), ("TotalAcceleration", accel)):
+        stamps = np.round(1.7e18 + time * 1e9).astype(np.int64)
+        rows = [f"{at},{t:.9g},{z:.9g},{y:.9g},{x:.9g}" for at, t, (x, y, z) in zip(stamps, time, values)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["time,seconds_elapsed,z,y,x", *rows]) + "\n")
+    np.testing.assert_allclose(read_imu(tmp_path).gyro, gyro, rtol=1e-6, atol=1e-6)

@@ -255,6 +255,7 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
     turned = facts.turned
     if turned and min(abs(np.log(facts.turning.best_scale * size(unit))) for unit in priors) > NO_UNIT:
         return []
+    shaken = facts.force_walk * size(accel_unit) > SHAKEN and np.isfinite(facts.turning.best_agreement)
     usual, weight = USUAL.get(accel_unit, ("", 1.0))
     readings = []
     for unit, prior in priors.items():
@@ -265,7 +266,7 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
             away = np.log(scale)
             likely *= 0.95 * np.exp(-0.5 * (away / 0.15) ** 2) + 0.05 * np.exp(-0.5 * (away / 0.6) ** 2) + 1e-12
             why = f"in {unit} the gyros turn {scale:.3g} times as far as gravity in the accelerometers"
-        elif facts.moves and facts.force_walk * size(accel_unit) > SHAKEN:
+        elif shaken:
             likely *= _in_motion(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
             why = f"in {unit} the rates of a log that never rests are up to {facts.largest * factor / DEG:.3g} deg/s"
         elif facts.walk > 0.0 and facts.mean_sigma < np.inf:
@@ -278,7 +279,7 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
             )
         else:
             why = "usual"
-        if not turned and facts.moves and facts.turning.best_agreement > HINTS:
+        if not turned and (facts.moves or shaken) and facts.turning.best_agreement > HINTS:
             scale = facts.turning.best_scale * factor
             likely *= _hint(facts.turning.best_agreement, scale)
             why += f"; they turn {scale:.2g} times as far as gravity in the accelerometers, which other forces hide"

@@ -37,6 +37,7 @@ COUNTER = re.compile(  # names of what counts rows, or packets of all kinds
     r"rec|msgs?|messages?|ids?|n)(?:_?\d+)?(?:_|$)"
 )
 OF_TIME = re.compile(r"(?i)time|stamp|[^a-z]ms|(?:^|[^a-z])t(?:[^a-z]|$)")
+REPEATS = 0.2  # of the rows, from which a clock that repeats is coarser than another
 FEW = 2.0  # whole steps, up to which numbers without a name may be counts with some left out, or ms
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
@@ -80,6 +81,12 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     names = [name for name in names if not (columns.named and clock_of(name)[0] and _is_empty(columns, name))]
     if "time" in names:
         choice.time = ("time",)
+        finer = _finer_clock(columns, names)
+        if finer is not None:
+            choice.time = (finer,)
+            why = "it increases in each row, where column time repeats"
+            choice.guesses.append(Guess("time", finer, why, 1.0, {"columns": {"time": finer}}))
+            _note_unit(choice, *clock_of(finer))
         return choice
     clocks = (
         {name: unit for name in names if (found := clock_of(name))[0] for unit in (found[1],)} if columns.named else {}
@@ -121,6 +128,26 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     return choice
 
 
+def _finer_clock(columns: Columns, names: Sequence[str]) -> str | None:
+    """The only other clock by its name that increases in each row, where ``time`` repeats in many; else None."""
+    others = [name for name in names if name != "time" and columns.named and clock_of(name)[0]]
+    others = [name for name in others if OF_OTHERS.search(plain(name)) is None]
+    if not others or (time := _steps(columns, "time")) is None or not np.mean(time == 0.0) > REPEATS:
+        return None
+    steps = {name: found for name in others if (found := _steps(columns, name)) is not None}
+    good = [name for name, found in steps.items() if len(found) == len(time) and found.min() > 0.0]
+    return good[0] if len(good) == 1 else None
+
+
+def _steps(columns: Columns, name: str) -> Array | None:
+    """Steps of a clock; None where it has none, or cells that are no times."""
+    try:
+        steps = np.diff(columns.clock(name)[0])
+    except DataError:
+        return None
+    return steps if steps.size and np.all(np.isfinite(steps)) else None
+
+
 def _is_empty(columns: Columns, name: str) -> bool:
     """Whether a clock has no value in any row, as those that a program's export lists and a device does not send."""
     column = columns.column(name)
@@ -159,11 +186,8 @@ def _note_unit(choice: Choice, is_clock: bool, unit: str | None) -> None:
 
 def _scatter(columns: Columns, name: str) -> float | None:
     """RMS scatter of a clock's steps over the median one; None where it does not always increase."""
-    try:
-        steps = np.diff(columns.clock(name)[0])
-    except DataError:
-        return None
-    if not steps.size or not np.all(np.isfinite(steps)) or steps.min() < 0.0 or np.median(steps) <= 0.0:
+    steps = _steps(columns, name)
+    if steps is None or steps.min() < 0.0 or np.median(steps) <= 0.0:
         return None
     median = float(np.median(steps))
     near = steps[steps < 3.0 * median]
@@ -253,13 +277,11 @@ def _check_skips(columns: Columns, choice: Choice, name: str) -> None:
 
 def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
     """Take the only column that increases steadily for the clock; a row counter is not a clock."""
-    found = []
-    for name in names[:MOST_COLUMNS]:
-        scatter = _scatter(columns, name)
-        if scatter is not None and scatter < STEADY:
-            found.append((name, _counts(columns, name, columns.clock(name)[0])))
-    clocks = _own(columns, choice, _as_long(columns, choice, [name for name, counts in found if not counts]))
-    choice.counter = next((name for name, counts in found if counts and columns.named), "")
+    steady = {name: scatter for name in names[:MOST_COLUMNS] if (scatter := _scatter(columns, name)) is not None}
+    counters = [name for name in steady if _counts(columns, name, columns.clock(name)[0])]
+    choice.counter = counters[0] if counters and columns.named else ""
+    found = [name for name, scatter in steady.items() if scatter < STEADY and name not in counters]
+    clocks = _own(columns, choice, _as_long(columns, choice, found))
     if len(clocks) == 1:
         _check_skips(columns, choice, clocks[0])
         choice.time = (clocks[0],)

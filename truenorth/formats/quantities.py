@@ -21,6 +21,7 @@ from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import unknown_key
 from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.checks import check_finite
+from truenorth.formats.clock_face import clock_face, of_clock_face
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.units import split, unit_in
@@ -188,6 +189,8 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
         )
     factors = {ours: claim[0][1] for ours, claim in claims.items()}
     time, said = columns.clock(labels["time"])
+    if said is None and "time" not in stated and factors["time"] == 1.0 and (face := clock_face(time)) is not None:
+        time, said = of_clock_face(time / face[1]), "times of day"
     factors["time"] = 1.0 if said is not None else _of_epoch(time, factors["time"])
     numbers = list(dict.fromkeys(label for ours, label in labels.items() if ours != "time"))
     table = columns.read(numbers, True) if numbers else np.zeros((len(time), 0))

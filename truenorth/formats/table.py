@@ -75,7 +75,7 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
     said_above = _said_above(columns, layout, choice, accel)
     choice.units = {**said_above, **choice.units}
-    choice.device |= device_above(columns.above, choice.labels[1:4])
+    choice.device |= {**columns.device, **device_above(columns.above, choice.labels[1:4])}
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
     kind, units = _units(time, gyro, accel, layout, choice, said_above, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)

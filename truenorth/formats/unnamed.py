@@ -13,6 +13,7 @@ from truenorth.core.errors import DataError
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.behaviour import accel_readings, gravity_level, is_usual
 from truenorth.formats.chosen import MOST_COLUMNS, Choice, with_time
+from truenorth.formats.clock_face import FEWEST
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
@@ -46,7 +47,10 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     choice = Choice(None, (), [], named=False)
     if longest >= 3:
         choice = with_time(whole if "time" in layout.columns else columns, layout, choice)
-    skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
+    # No sensor's values increase in each of many rows: a counter's do, or those of a clock where the rate is given.
+    skip = set(choice.time) | {
+        name for name, v in numbers.items() if np.all(v[1:] > v[:-1] if longest > FEWEST else np.diff(v) == 1.0)
+    }
     free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
     left_out = others_of(free, [list(three.values()) for three in _threes(free).values()]) if columns.named else set()
     blocks, forces = _sets(columns, choice, numbers, free, left_out, columns.named)
