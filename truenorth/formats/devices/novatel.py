@@ -38,7 +38,7 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
         if name.startswith("RAWIMU"):
             rows["imu"].append([float(values["gps_seconds"]), *_counts(values)])
         elif name.startswith("BESTPOS") and _solved(values):
-            height = float(values["orthometric_height"]) + float(values["undulation"])
+            height = _height(values)
             sigmas = [float(values[f"{key}_std_dev"]) for key in ("longitude", "latitude", "height")]
             rows["place"].append([tow, float(values["latitude"]), float(values["longitude"]), height, *sigmas])
         elif name.startswith("BESTVEL") and _solved(values):
@@ -68,7 +68,14 @@ def _text_messages(path: Path) -> Iterator[Any]:
 
 
 def _solved(values: dict[str, Any]) -> bool:
-    return int(values.get("solution_status", values.get("status", 1))) == 0
+    said = next((values[name] for name in ("solution_status", "status", "velocity_status") if name in values), 1)
+    return int(said) == 0
+
+
+def _height(values: dict[str, Any]) -> float:
+    """Above the ellipsoid: older firmware calls that above mean sea level ``height``, too, where an undulation stands by it."""
+    above = values["height"] if "height" in values else values["orthometric_height"]
+    return float(above) + float(values.get("undulation", 0.0))
 
 
 def _counts(values: dict[str, Any]) -> list[float]:
@@ -80,9 +87,8 @@ def _counts(values: dict[str, Any]) -> list[float]:
 
 
 def _pose(values: dict[str, Any], tow: float) -> list[float]:
-    up = values["height"] if "height" in values else values["orthometric_height"] + values["undulation"]
     names = ("latitude", "longitude", "", "east_vel", "north_vel", "up_vel", "roll", "pitch", "azimuth")
-    return [float(values.get("seconds", tow)), *(float(values[name]) if name else float(up) for name in names)]
+    return [float(values.get("seconds", tow)), *(float(values[name]) if name else _height(values) for name in names)]
 
 
 def _imu(rows: list[list[float]]) -> dict[str, Array]:
