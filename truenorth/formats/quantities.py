@@ -24,6 +24,7 @@ from truenorth.formats.checks import check_finite
 from truenorth.formats.clock_face import clock_face, of_clock_face
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
+from truenorth.formats.hemispheres import with_signs
 from truenorth.formats.units import split, unit_in
 from truenorth.records import IN_ORDER, Late
 
@@ -200,7 +201,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
             "those of one sensor"
         )
     values = {ours: table[:, numbers.index(label)] * factors[ours] for ours, label in labels.items() if ours != "time"}
-    values = {"time": time * factors["time"], **values}
+    values = {"time": time * factors["time"], **with_signs(columns, values)}
     found = Found(source, labels, values, factors, columns.place, frozenset(options.columns), frozenset(stated))
     found.require("time")
     if said is None and "time" not in stated and factors["time"] == 1.0:
