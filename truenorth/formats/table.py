@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -49,9 +49,6 @@ CONTRADICTED = 1.0  # of the logarithm, by which gyros turn gravity too far in a
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
-@np.errstate(
-    over="ignore", invalid="ignore"
-)  # a cell may hold 1e200: what is too large for any sensor is refused at the end
 def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     """The record of a log of named columns.
 
@@ -60,10 +57,26 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     DataError
         Bad data, with place and column; gravity in no unit; stamps in bunches.
     UnsureError
-        Two readings explain the log.
+        Two readings explain the log. What it offers holds what the caller has said: it may be given as it is.
     UsageError
         A unit of another dimension, or neither time nor rate.
     """
+    try:
+        return _record_of(columns, layout)
+    except UnsureError as error:
+        options = [_with_what_is_said(option, layout) for option in error.options]
+        raise UnsureError(error.question, options, error.guesses) from None
+
+
+def _with_what_is_said(option: Mapping[str, Any], layout: Layout) -> dict[str, Any]:
+    said: dict[str, Mapping[str, str]] = {"columns": layout.columns, "units": layout.units}
+    return {key: {**said[key], **value} if key in said else value for key, value in option.items()}
+
+
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # a cell may hold 1e200: what is too large for any sensor is refused at the end
+def _record_of(columns: Columns, layout: Layout) -> ImuRecord:
     source, columns = columns.path.name, with_angles(columns)
     choice = choose(columns, layout)
     guesses = choice.guesses
