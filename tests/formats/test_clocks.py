@@ -123,3 +123,27 @@ def test_bunches_of_whole_steps_are_still_asked_about(tmp_path, kind):
     path = write(tmp_path / "log.csv", f"time (ms),{XYZ}", stamps, MOVED.gyro, MOVED.accel)
     with pytest.raises(UnsureError, match="bunches"):
         read_imu(path)
+
+
+@pytest.mark.parametrize("times", [2, 24])
+def test_rows_that_are_all_written_many_times_are_taken_once(tmp_path, times):
+    """A node wrote each message 24 times: a rate was offered for copies of rows."""
+    every = np.repeat(np.arange(len(MOVED.time)), times)
+    path = write(tmp_path / "log.csv", f"time,{XYZ}", MOVED.time[every], MOVED.gyro[every], MOVED.accel[every])
+    record = is_read(path)
+    assert any("rows that repeat" in guess.value for guess in record.taken_for)
+
+
+def test_rows_of_one_coarse_stamp_that_differ_are_no_copies(tmp_path):
+    coarse = np.floor(MOVED.time * 10.0) / 10.0
+    held = np.arange(len(MOVED.time)) // 2 * 2
+    path = write(tmp_path / "log.csv", f"time,{XYZ}", coarse, MOVED.gyro[held], MOVED.accel[held])
+    with pytest.raises(UnsureError, match="repeat"):
+        read_imu(path)
+
+
+def test_the_sensors_own_stamp_where_that_of_the_arrival_repeats(tmp_path):
+    arrival = np.maximum.accumulate(MOVED.time + 0.004 * (np.arange(len(MOVED.time)) % 97 > 94))
+    arrival[1000::500] = arrival[999::500][: len(arrival[1000::500])]
+    path = write(tmp_path / "log.csv", f"%time,field.header.stamp,{XYZ}", arrival, MOVED.time, MOVED.gyro, MOVED.accel)
+    np.testing.assert_array_equal(is_read(path).time, MOVED.time)

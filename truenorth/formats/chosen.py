@@ -37,7 +37,6 @@ COUNTER = re.compile(  # names of what counts rows, or packets of all kinds
     r"rec|msgs?|messages?|ids?|n)(?:_?\d+)?(?:_|$)"
 )
 OF_TIME = re.compile(r"(?i)time|stamp|[^a-z]ms|(?:^|[^a-z])t(?:[^a-z]|$)")
-REPEATS = 0.2  # of the rows, from which a clock that repeats is coarser than another
 FEW = 2.0  # whole steps, up to which numbers without a name may be counts with some left out, or ms
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
@@ -84,7 +83,7 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
         finer = _finer_clock(columns, names)
         if finer is not None:
             choice.time = (finer,)
-            why = "it increases in each row, where column time repeats"
+            why = "it increases in each row, where column time does not"
             choice.guesses.append(Guess("time", finer, why, 1.0, {"columns": {"time": finer}}))
             _note_unit(choice, *clock_of(finer))
         return choice
@@ -129,13 +128,14 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
 
 
 def _finer_clock(columns: Columns, names: Sequence[str]) -> str | None:
-    """The only other clock by its name that increases in each row, where ``time`` repeats in many; else None."""
+    """The only other clock by its name that increases in each row, and steadily, where ``time`` repeats or goes back; else None."""
     others = [name for name in names if name != "time" and columns.named and clock_of(name)[0]]
     others = [name for name in others if OF_OTHERS.search(plain(name)) is None]
-    if not others or (time := _steps(columns, "time")) is None or not np.mean(time == 0.0) > REPEATS:
+    if not others or (time := _steps(columns, "time")) is None or time.min() > 0.0:
         return None
     steps = {name: found for name in others if (found := _steps(columns, name)) is not None}
     good = [name for name, found in steps.items() if len(found) == len(time) and found.min() > 0.0]
+    good = [name for name in good if (_scatter(columns, name) or 0.0) < STEADY]
     return good[0] if len(good) == 1 else None
 
 
