@@ -76,3 +76,14 @@ def test_the_app_sensor_logger_writes_rad_per_second(tmp_path):
         rows = [f"{at},{t:.9g},{z:.9g},{y:.9g},{x:.9g}" for at, t, (x, y, z) in zip(stamps, time, values)]
         (tmp_path / f"{name}.csv").write_text("\n".join(["time,seconds_elapsed,z,y,x", *rows]) + "\n")
     np.testing.assert_allclose(read_imu(tmp_path).gyro, gyro, rtol=1e-6, atol=1e-6)
+
+
+def test_rostopic_writes_rad_per_second(tmp_path):
+    """So sensor_msgs/Imu is defined; the bare names are used for deg/s as well."""
+    _, gyro, accel = walking(3)
+    three = [f"angular_velocity.{x}" for x in "xyz"], [f"linear_acceleration.{x}" for x in "xyz"]
+    head = ",".join(["field.header.seq", *(f"field.{name}" for name in (*three[1], *three[0]))])
+    record = read_imu(write(tmp_path / "imu.csv", gyro, accel, head=head), rate=RATE)
+    np.testing.assert_allclose(record.gyro, gyro, rtol=1e-6, atol=1e-6)
+    with pytest.raises(UnsureError, match="rad/s"):
+        read_imu(write(tmp_path / "imu.csv", gyro, accel, head=head.replace("field.", "")), rate=RATE)
