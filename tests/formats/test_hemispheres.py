@@ -6,7 +6,7 @@ import pytest
 from truenorth.core.errors import DataError
 from truenorth.formats import read_gnss
 
-HEADS = ("INDEX,TIME,LATITUDE,N/S,LONGITUDE,E/W,HEIGHT", "index,time,lat,lat_dir,long,long_dir,alt",
+HEADS = ("INDEX,Time Stamp,LATITUDE,N/S,LONGITUDE,E/W,HEIGHT", "index,time,lat,lat_dir,long,long_dir,alt",
          "n,t,Latitude,NS,Longitude,EW,Altitude")  # fmt: skip
 
 

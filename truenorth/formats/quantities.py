@@ -51,7 +51,7 @@ class Quantity:
 
 Meaning = tuple[Quantity, float, str | None]  # a quantity, its sign, and the unit that the heading names
 
-TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc", "time_since_start_in"))
+TIME = Quantity("time", "time", "s", ("t", "timestamp", "time_stamp", "tow", "gps_time", "utc", "time_since_start_in"))
 
 
 @dataclass(frozen=True)
