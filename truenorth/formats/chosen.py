@@ -37,6 +37,7 @@ COUNTER = re.compile(  # names of what counts rows, or packets of all kinds
     r"rec|msgs?|messages?|ids?|n)(?:_?\d+)?(?:_|$)"
 )
 OF_TIME = re.compile(r"(?i)time|stamp|[^a-z]ms|(?:^|[^a-z])t(?:[^a-z]|$)")
+REPEATS = 0.2  # of the rows, from which a clock that repeats is coarser than any other
 FEW = 2.0  # whole steps, up to which numbers without a name may be counts with some left out, or ms
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
@@ -55,6 +56,7 @@ class Choice:
     fraction: float = 1e-9  # s, that the second column of the time counts
     # units, and why, that the device which wrote the log always has: what the headings name wins
     device: dict[str, tuple[str, str]] = field(default_factory=dict)
+    doubt: UnsureError | None = None  # of the clock, to be asked where the sensors are found
     counter: str = ""  # a column that increases as a clock does, and by its name counts
 
     @property
@@ -128,14 +130,15 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
 
 
 def _finer_clock(columns: Columns, names: Sequence[str]) -> str | None:
-    """The only other clock by its name that increases in each row, and steadily, where ``time`` repeats or goes back; else None."""
+    """The only other clock by its name that increases in each row, where ``time`` does not; else None."""
     others = [name for name in names if name != "time" and columns.named and clock_of(name)[0]]
     others = [name for name in others if OF_OTHERS.search(plain(name)) is None]
     if not others or (time := _steps(columns, "time")) is None or time.min() > 0.0:
         return None
     steps = {name: found for name in others if (found := _steps(columns, name)) is not None}
     good = [name for name, found in steps.items() if len(found) == len(time) and found.min() > 0.0]
-    good = [name for name in good if (_scatter(columns, name) or 0.0) < STEADY]
+    coarse = np.mean(time == 0.0) > REPEATS
+    good = [name for name in good if coarse or (_scatter(columns, name) or 0.0) < STEADY]
     return good[0] if len(good) == 1 else None
 
 
@@ -261,14 +264,14 @@ def _counts(columns: Columns, name: str, time: Array) -> bool:
     return named and bool(np.all(time == np.round(time))) and not dated
 
 
-def _check_skips(columns: Columns, choice: Choice, name: str) -> None:
-    """Ask of whole numbers that go up by 1, now and then by more: ms of a quick log, or a counter that leaves out some."""
+def _doubt_of_skips(columns: Columns, choice: Choice, name: str) -> UnsureError | None:
+    """What to ask of whole numbers that go up by 1, now and then by more: ms of a quick log, or a counter that leaves out some."""
     time, said = columns.clock(name)
     steps = np.diff(time)
     whole = said is None and bool(np.all(steps == np.round(steps)))
     if not whole or steps.min() != 1.0 or np.median(steps) > FEW or OF_TIME.search(name) is not None:
-        return
-    raise UnsureError(
+        return None
+    return UnsureError(
         f"{columns.path.name}: column {name} goes up by 1 to {steps.max():.0f} from row to row: it may be in ms "
         f"({1e3 / np.mean(steps):.4g} rows a second) or count rows or packets, of which some are missing",
         [{"columns": {"time": name}, "units": {"time": "ms"}}, {"rate": "(rows a second)"}], choice.guesses,
@@ -283,7 +286,7 @@ def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names:
     found = [name for name, scatter in steady.items() if scatter < STEADY and name not in counters]
     clocks = _own(columns, choice, _as_long(columns, choice, found))
     if len(clocks) == 1:
-        _check_skips(columns, choice, clocks[0])
+        choice.doubt = _doubt_of_skips(columns, choice, clocks[0])
         choice.time = (clocks[0],)
         choice.guesses.append(
             Guess(

@@ -4,7 +4,6 @@
 - The table of Betaflight's and iNAV's explorer of flight logs: ``acc_1G``, the counts of gravity.
 - Xsens's MT Manager writes remarks (``// Start Time``, ``// Sample rate``, ``// Firmware Version``) above columns ``Acc_X`` ..
   ``Gyr_X`` ..; its gyros are in rad/s. The app of an Xsens DOT has other lines there, and deg/s.
-- Tables of messages of ROS (``rostopic echo -p``: ``field.angular_velocity.x``) are in rad/s, as the message is defined.
 
 Source: Gyroflow, documentation of its log format; Betaflight, ``blackbox.c``; Xsens, MT Manager User Manual, MT0216P.
 """
@@ -19,9 +18,6 @@ ORIENTATION = re.compile(r'\W*orientation"?\s*[,;:=\t ]\s*"?([XYZxyz]{3})"?\W*',
 MT_MANAGER = re.compile(
     r"\s*//\s*(?:mt manager|xda) version\b|\s*//\s*(?:start time|firmware version)\s*:", re.IGNORECASE
 )
-ROS = re.compile(
-    r"field\.(?:\w+\.)*angular_velocity\.[xyz]"
-)  # as rostopic writes it; others use the bare name for deg/s
 LINE = re.compile(r'\W*(gscale|ascale|tscale|acc_1g)"?\s*[,;:=\t ]\s*"?([\d.]+(?:e[+-]?\d+)?)"?\W*', re.IGNORECASE)
 
 
@@ -50,9 +46,7 @@ def orientation_above(above: Sequence[str]) -> str | None:
 
 
 def device_above(above: Sequence[str], gyros: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Unit of the ``gyro``, and why, that what wrote a log always writes, by the lines above its table or the form of its names."""
+    """Unit of the ``gyro``, and why, that what wrote a log always writes, by the lines above its table."""
     if tuple(gyros) == ("Gyr_X", "Gyr_Y", "Gyr_Z") and any(MT_MANAGER.match(line) for line in above):
         return {"gyro": ("rad/s", "by the lines above the table Xsens's MT Manager wrote it, in rad/s")}
-    if gyros and all(ROS.fullmatch(name.strip()) for name in gyros):
-        return {"gyro": ("rad/s", "columns of a message sensor_msgs/Imu of ROS, which are in rad/s")}
     return {}

@@ -81,6 +81,8 @@ def _record_of(columns: Columns, layout: Layout) -> ImuRecord:
     choice = choose(columns, layout)
     guesses = choice.guesses
     gyro, accel = _sensors(columns, layout, choice)
+    if choice.doubt is not None:
+        raise choice.doubt
     columns, kept = without_repeats(columns, choice, gyro, accel)
     if kept is not None:
         gyro, accel = gyro[kept], accel[kept]
