@@ -188,10 +188,44 @@ def dataflash_bytes(log=SWAY):
     return b"".join(parts)
 
 
+def old_dataflash_bytes(log=SWAY):
+    """As ArduPilot wrote before version 3.3: ms, and of GPS the time of week first and the board's last."""
+
+    def form(kind, length, name, types, names):
+        return struct.pack("<BBBBB4s16s64s", 0xA3, 0x95, 0x80, kind, length, name, types, names)
+
+    parts = [form(0x80, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")]
+    parts.append(form(0x81, 3 + 4 + 24, b"IMU", b"Iffffff", b"TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"))
+    parts.append(form(0x82, 3 + 5 + 8 + 4 + 12 + 4, b"GPS", b"BILLefffI", b"Status,TimeMS,Lat,Lng,Alt,Spd,GCrs,VZ,T"))
+    parts.append(form(0x83, 3 + 4 + 12 + 1, b"MAG", b"IfffB", b"TimeMS,MagX,MagY,MagZ,Health"))
+    gyro, accel, mgauss = FRD(log.gyro), FRD(log.accel), FRD(log.accel) * FIELD_OF_FORCE * 1e7
+    for k, t in enumerate(log.time):
+        at = round(t * 1e3)
+        if k % 10 == 0:
+            parts.append(struct.pack("<BBBI3fB", 0xA3, 0x95, 0x83, at, *mgauss[k], 1))
+        parts.append(struct.pack("<BBBI6f", 0xA3, 0x95, 0x81, at, *gyro[k], *accel[k]))
+        if k % 100 == 0:
+            course = np.degrees(np.arctan2(2.0, 1.0))
+            values = (round(LAT * 1e7), round(LON * 1e7), round(ALT * 100), np.hypot(1, 2), course, 0.5)
+            parts.append(struct.pack("<BBBBIiiifffI", 0xA3, 0x95, 0x82, 3, 345600000 + at, *values, at))
+    return b"".join(parts)
+
+
+def test_messages_of_a_flight_controller_without_a_time_are_named(tmp_path):
+    pytest.importorskip("pymavlink")
+    (path := tmp_path / "old.bin").write_bytes(old_dataflash_bytes().replace(b"GCrs,VZ,T", b"GCrs,VZ,X"))
+    with pytest.raises(DataError, match=r"messages GPS have no time of the board among .*TimeMS.*expected TimeUS"):
+        read_gnss(path)
+
+
 @pytest.mark.parametrize(
     ("module", "name", "content"),
-    [("pyulog", "log.ulg", ulog_bytes), ("pymavlink", "00000001.bin", dataflash_bytes)],
-    ids=["px4", "ardupilot"],
+    [
+        ("pyulog", "log.ulg", ulog_bytes),
+        ("pymavlink", "00000001.bin", dataflash_bytes),
+        ("pymavlink", "old.bin", old_dataflash_bytes),
+    ],
+    ids=["px4", "ardupilot", "ardupilot before 3.3"],
 )
 def test_flight_controllers(tmp_path, module, name, content):
     pytest.importorskip(module)
@@ -257,7 +291,9 @@ def novatel_crc(content):
     return zlib.crc32(content, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
-def test_novatel(tmp_path):
+@pytest.mark.parametrize("forms", [("cdba",) * 3, ("b1f6", "0141", "471d")], ids=["since 2020", "before"])
+def test_novatel(tmp_path, forms):
+    """Older firmware calls the height above mean sea level ``height``: its messages have other sums of their definitions."""
     pytest.importorskip("novatel_edie")
     path = tmp_path / "log.gps"
     place, errors = f"{LAT},{LON},{ALT - 45.0},45.0", ",".join(["0.1"] * 9)
@@ -265,10 +301,12 @@ def test_novatel(tmp_path):
     lines = []
     for k in range(10):
         fix = f'SOL_COMPUTED,SINGLE,{place},WGS84,2.0,1.0,3.0,"",0.0,0.0,12,12,12,0,00,06,00,33'
-        lines.append(novatel_line("BESTPOSA", fix, TOW + k))
-        lines.append(novatel_line("BESTVELA", f"SOL_COMPUTED,DOPPLER_VELOCITY,0.15,0.0,{course},-0.5,0.0", TOW + k))
+        lines.append(novatel_line("BESTPOSA", fix, TOW + k, forms[0]))
+        lines.append(
+            novatel_line("BESTVELA", f"SOL_COMPUTED,DOPPLER_VELOCITY,0.15,0.0,{course},-0.5,0.0", TOW + k, forms[1])
+        )
         ins = f"INS_SOLUTION_GOOD,INS_RTKFIXED,{place},1.0,2.0,-0.5,1.5,-0.7,123.0,{errors},0,0"
-        lines.append(novatel_line("INSPVAXA", ins, TOW + k))
+        lines.append(novatel_line("INSPVAXA", ins, TOW + k, forms[2]))
     path.write_text("".join(lines))
     record = read_gnss(path)
     assert_is_at_home(record, 10)
@@ -343,6 +381,36 @@ def test_rtklib(tmp_path):
         np.testing.assert_allclose(record.alt, ALT)
         np.testing.assert_allclose(record.position_sigma, np.tile([1.0, 2.0, 3.0], (10, 1)))
         np.testing.assert_allclose(record.time, start + np.arange(10.0), atol=1e-6)
+
+
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_rtklib_with_marks_between_the_columns(tmp_path, mark):
+    """Its option out-fieldsep; week and seconds are two columns then, and a date with its time of day is one."""
+    path = tmp_path / "rover.pos"
+    names = [
+        "%  GPST        ",
+        " latitude(deg)",
+        "longitude(deg)",
+        " height(m)",
+        "  Q",
+        " ns",
+        "  sdn(m)",
+        "  sde(m)",
+        "  sdu(m)",
+    ]
+    rest = ["", f"{LAT:14.9f}", f"{LON:14.9f}", f"{ALT:10.4f}", " 1", " 9", " 2.0", " 1.0", " 3.0"]
+    times = [f"2304{mark}{TOW:.0f}.000", f"2304{mark}{TOW + 1:.0f}.000", f"2304{mark}{TOW + 2:.0f}.000"]
+    dates = [f"2024/03/05 10:00:0{k}.000" for k in range(3)]
+    for stamps, start in ((times, TOW), (dates, 1709632800.0)):
+        rows = [stamp + mark.join(rest) for stamp in stamps]
+        path.write_text("% program   : RTKPOST ver.2.4.2\n" + "\n".join([mark.join(names), *rows]) + "\n")
+        record = read_gnss(path)
+        np.testing.assert_allclose(record.time, start + np.arange(3.0), atol=1e-6)
+        np.testing.assert_allclose(np.degrees([record.lat, record.lon]).T, np.tile([LAT, LON], (3, 1)))
+        np.testing.assert_allclose(record.position_sigma, np.tile([1.0, 2.0, 3.0], (3, 1)))
+    path.write_text(path.read_text().replace(mark + "  sdu(m)", "").replace(mark + "  sde(m)", ""))
+    with pytest.raises(DataError, match=r"a header of 7 (?:names|columns) above rows of 9"):
+        read_gnss(path)
 
 
 def test_the_gnss_text_of_kf_gins(tmp_path):

@@ -63,7 +63,7 @@ NAVIGATION = (
 )
 PLACE = (
     Quantity("lat", "angle", "deg", ("latitude", "location_latitude"), (), "position"),
-    Quantity("lon", "angle", "deg", ("longitude", "lng", "location_longitude"), (), "position"),
+    Quantity("lon", "angle", "deg", ("longitude", "lng", "long", "location_longitude"), (), "position"),
     Quantity(
         "alt",
         "length",

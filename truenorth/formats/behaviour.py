@@ -7,6 +7,8 @@
 - **Gyros at rest.** White noise gives the angle random walk of a reading, and with it what bias such a gyro has: from one to
   ten thousand deg/h for each deg/sqrt(h). The mean rate, the earth's plus that bias, is likely or not: a gyrocompass shows the
   earth's rate in one unit only, a cheap gyro's bias explains several, and then nobody can tell.
+- **Gyros that never rest.** What a leg or a hand turns by from row to row is no noise: the noise is at most that, and the mean rate
+  is the motion's. Gravity's turn counts there even where quick motions hide most of it, and decides less.
 - **Clocks.** IMUs write 5 to 4000 rows a second; dates since 1970 have their size.
 
 What is usual (rad/s with m/s^2, deg/s with g) weighs a little; it never decides alone.
@@ -49,6 +51,10 @@ LARGE_TURN = 3.0 * DEG  # of two axes: what angles must turn by to be known from
 FAR_BETTER = 0.5  # of the agreement of angles: what that of rates must stay below
 ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less than in rad or deg
 DECADE = 0.25  # decades by which those limits are soft
+SHAKEN = 3.0 * WORST_FORCE_WALK  # by motions that are quick from row to row
+MOVES = 8.0  # times the white noise of a row, that the gyros of a log at rest never show
+HINTS = 0.3  # share of gravity's turn that the gyros of a log without a rest explain by more than chance
+LEAST_HINT = 0.01  # likelihood of a unit that turns gravity too far, where quick motions hide most of its turn
 
 # Prior weight of a unit: how often logs are written so.
 ACCEL_UNITS: dict[Kind, dict[str, float]] = {
@@ -137,6 +143,7 @@ class GyroFacts:
     walk: float
     largest: float
     force_walk: float
+    moves: bool = False  # and rests nowhere: the noise is `walk` at most, the mean rate that of the motion
 
     @property
     def turned(self) -> bool:
@@ -158,11 +165,17 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     turning = fit_turning(rows * interval, np.ascontiguousarray(rates))
     largest = float(np.quantile(np.abs(data[:, :3]), 0.999)) if len(data) else 0.0
     data = _at_rest_part(data, interval)
-    walk, force_walk = _random_walk(data[:, :3], interval), _random_walk(data[:, 3:], interval)
+    (walk, is_noise), (force_walk, _) = _random_walk(data[:, :3], interval), _random_walk(data[:, 3:], interval)
+    moves = not is_noise and _swing(data[:, :3]) > MOVES * walk / np.sqrt(interval)
     parts = [part.mean(axis=0) for part in np.array_split(data[:, :3], 10)] if len(data) >= 100 else []
     wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
     mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
-    return GyroFacts(turning, mean, wander, walk, largest, force_walk)
+    return GyroFacts(turning, mean, wander, walk, largest, force_walk, moves)
+
+
+def _swing(gyro: Array) -> float:
+    """How far the rates go from their middle."""
+    return float(np.quantile(np.abs(gyro - np.median(gyro, axis=0)), 0.999)) if len(gyro) else 0.0
 
 
 def are_angles(time: Array, gyro: Array, accel: Array, as_rates: float) -> bool:
@@ -212,8 +225,8 @@ def _at_rest_part(data: Array, interval: float) -> Array:
     return data[run[0] * rows : (run[-1] + 1) * rows]
 
 
-def _random_walk(data: Array, interval: float) -> float:
-    """Of the three columns the middle one's: the least of the Allan deviation times the root of its time.
+def _random_walk(data: Array, interval: float) -> tuple[float, bool]:
+    """Of the three columns the middle one's: the least of the Allan deviation times the root of its time; and whether it is noise.
 
     Rows that a low-pass filter or an interpolation has smoothed differ less from their neighbours than the noise: they do not
     count where tenths of a second differ as white noise does. (Of a sway these are smooth, too, and rows count.) Second
@@ -230,7 +243,10 @@ def _random_walk(data: Array, interval: float) -> float:
             walks.append(np.sqrt(0.5 * power * m * interval))
             rough.append(bool(np.median(second - ROUGH * power) > 0.0))
     smoothed = rough[:2] == [False, True]
-    return float(np.median(np.min(walks[smoothed:], axis=0))) if walks else 0.0
+    if not walks:
+        return 0.0, True
+    least = int(np.argmin(np.median(walks[smoothed:], axis=1))) + smoothed
+    return float(np.median(np.min(walks[smoothed:], axis=0))), rough[least]
 
 
 def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence[str] | None = None) -> list[Reading]:
@@ -239,6 +255,7 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
     turned = facts.turned
     if turned and min(abs(np.log(facts.turning.best_scale * size(unit))) for unit in priors) > NO_UNIT:
         return []
+    shaken = facts.force_walk * size(accel_unit) > SHAKEN and np.isfinite(facts.turning.best_agreement)
     usual, weight = USUAL.get(accel_unit, ("", 1.0))
     readings = []
     for unit, prior in priors.items():
@@ -249,6 +266,9 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
             away = np.log(scale)
             likely *= 0.95 * np.exp(-0.5 * (away / 0.15) ** 2) + 0.05 * np.exp(-0.5 * (away / 0.6) ** 2) + 1e-12
             why = f"in {unit} the gyros turn {scale:.3g} times as far as gravity in the accelerometers"
+        elif shaken:
+            likely *= _in_motion(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
+            why = f"in {unit} the rates of a log that never rests are up to {facts.largest * factor / DEG:.3g} deg/s"
         elif facts.walk > 0.0 and facts.mean_sigma < np.inf:
             likely *= _at_rest(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
             likely *= _of_one_class(facts.walk * factor, facts.force_walk * size(accel_unit))
@@ -259,6 +279,10 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
             )
         else:
             why = "usual"
+        if not turned and (facts.moves or shaken) and facts.turning.best_agreement > HINTS:
+            scale = facts.turning.best_scale * factor
+            likely *= _hint(facts.turning.best_agreement, scale)
+            why += f"; they turn {scale:.2g} times as far as gravity in the accelerometers, which other forces hide"
         readings.append((unit, float(likely), why, kind))
     return _ranked(readings)
 
@@ -274,11 +298,30 @@ def _at_rest(mean: float, sigma: float, walk: float) -> float:
     The norm x of the earth's rate W plus a bias of variance s^2 on each axis has the density
     ``x / (W s sqrt(2 pi)) (exp(-(x - W)^2 / 2 s^2) - exp(-(x + W)^2 / 2 s^2))``; times x, of its logarithm.
     """
+    limits = _below(walk, WALKS[1]) * _below(WALKS[0], walk) * _below(mean, LARGEST_BIAS)
+    return _density(mean, sigma, walk) * limits
+
+
+def _density(mean: float, sigma: float, walk: float) -> float:
     bias = np.hypot(BIAS_RATIOS * walk / 60.0, sigma)  # deg/h for deg/sqrt(h) is 1/60 of rad/s for rad/sqrt(s)
     x, w = mean, EARTH_RATE
     near = np.exp(-0.5 * ((x - w) / bias) ** 2) - np.exp(-0.5 * ((x + w) / bias) ** 2)
     density = x * x / (w * bias * np.sqrt(2.0 * np.pi)) * near
-    return float(np.mean(density) + 1e-6) * _below(walk, WALKS[1]) * _below(WALKS[0], walk) * _below(mean, LARGEST_BIAS)
+    return float(np.mean(density) + 1e-6)
+
+
+def _in_motion(mean: float, sigma: float, walk: float) -> float:
+    """Likelihood of a mean rate of a log that never rests, whose noise is `walk` at most: over the noises of all gyros."""
+    walks = np.geomspace(*WALKS, 13)
+    likely = sum(_density(mean, sigma, float(w)) for w in walks if w <= walk) / len(walks)
+    return likely * _below(max(0.0, mean - 2.0 * sigma), LARGEST_BIAS) + 1e-9
+
+
+def _hint(agreement: float, scale: float) -> float:
+    """Likelihood of a scale of the gyros by gravity's turn of which they explain a part: the less, the less it decides."""
+    away = np.log(scale)
+    near = 0.5 * np.exp(-0.5 * (away / 0.3) ** 2) + 0.5 * np.exp(-0.5 * (away / NO_UNIT) ** 2)
+    return float(near + LEAST_HINT) ** ((agreement - HINTS) / (AGREES - HINTS))
 
 
 def _of_one_class(walk: float, force_walk: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
 import numpy as np
@@ -142,6 +142,12 @@ def _by_caller(columns: Columns, layout: Layout, named: dict[str, tuple[str, flo
             named[ours] = (ours, 1.0)
         elif len(sets) == 1:
             named[ours] = (sets[0][ours[-1]].name, 1.0)
+    if (sensor := _one_sensor(kind, named)) is not None and all(named[ours][0] in columns.names for ours in named):
+        from truenorth.formats.unnamed import by_behaviour
+
+        three = [named[ours][0] for ours in (COLUMNS[kind][:3] if sensor == "gyro" else COLUMNS[kind][3:])]
+        both = by_behaviour(columns, layout, {sensor: three}).sensors
+        named |= {ours: both[k] for k, ours in enumerate(COLUMNS[kind]) if ours not in named}
     for ours in COLUMNS[kind]:
         if ours not in named or named[ours][0] not in columns.names:
             raise missing_column(columns, ours, named.get(ours, (ours, 1.0))[0])
@@ -153,6 +159,12 @@ def _by_caller(columns: Columns, layout: Layout, named: dict[str, tuple[str, flo
     given |= {key: layout.columns[key] for key in ("time", "scale", "interval") if key in layout.columns}
     choice.guesses.append(Guess("columns", ", ".join(given.values()), "as the caller says", 1.0, {"columns": given}))
     return with_time(columns, layout, choice)
+
+
+def _one_sensor(kind: Kind, named: Mapping[str, object]) -> str | None:
+    """The one sensor of which all three columns are known, where none of the other's is."""
+    have = ["".join(ours[-1] for ours in three if ours in named) for three in (COLUMNS[kind][:3], COLUMNS[kind][3:])]
+    return {("xyz", ""): "gyro", ("", "xyz"): "accel"}.get((have[0], have[1]))
 
 
 def _units(columns: Columns, layout: Layout, headings: Sequence[Heading | None], kind: Kind) -> dict[str, str]:

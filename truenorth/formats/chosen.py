@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
 from truenorth.formats.names import clock_of, is_plain_clock, plain
+from truenorth.formats.units import split
 from truenorth.records import Guess
 from truenorth.records.imu import Kind
 
@@ -30,6 +32,13 @@ FRACTIONS = {
     1e-3: re.compile(r"(?i)(?:^|[^a-z])(?:milli_?seconds?|millis|msecs?)(?:_elapsed)?$"),
     1e-6: re.compile(r"(?i)(?:^|[^a-z])(?:micro_?seconds?|micros|usecs?)(?:_elapsed)?$"),
 }
+COUNTER = re.compile(  # names of what counts rows, or packets of all kinds
+    r"(?:^|_)(?:packets?|pkt|counter|counts?|cnt|ctr|ind(?:ex|ices)|idx|numbers?|num|no|nr|seq\w*|frames?|samples?|rows?|lines?|records?|"
+    r"rec|msgs?|messages?|ids?|n)(?:_?\d+)?(?:_|$)"
+)
+OF_TIME = re.compile(r"(?i)time|stamp|[^a-z]ms|(?:^|[^a-z])t(?:[^a-z]|$)")
+REPEATS = 0.2  # of the rows, from which a clock that repeats is coarser than any other
+FEW = 2.0  # whole steps, up to which numbers without a name may be counts with some left out, or ms
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
 
@@ -47,6 +56,8 @@ class Choice:
     fraction: float = 1e-9  # s, that the second column of the time counts
     # units, and why, that the device which wrote the log always has: what the headings name wins
     device: dict[str, tuple[str, str]] = field(default_factory=dict)
+    doubt: UnsureError | None = None  # of the clock, to be asked where the sensors are found
+    counter: str = ""  # a column that increases as a clock does, and by its name counts
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -71,6 +82,12 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     names = [name for name in names if not (columns.named and clock_of(name)[0] and _is_empty(columns, name))]
     if "time" in names:
         choice.time = ("time",)
+        finer = _finer_clock(columns, names)
+        if finer is not None:
+            choice.time = (finer,)
+            why = "it increases in each row, where column time does not"
+            choice.guesses.append(Guess("time", finer, why, 1.0, {"columns": {"time": finer}}))
+            _note_unit(choice, *clock_of(finer))
         return choice
     clocks = (
         {name: unit for name in names if (found := clock_of(name))[0] for unit in (found[1],)} if columns.named else {}
@@ -112,6 +129,28 @@ def with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
     return choice
 
 
+def _finer_clock(columns: Columns, names: Sequence[str]) -> str | None:
+    """The only other clock by its name that increases in each row, where ``time`` does not; else None."""
+    others = [name for name in names if name != "time" and columns.named and clock_of(name)[0]]
+    others = [name for name in others if OF_OTHERS.search(plain(name)) is None]
+    if not others or (time := _steps(columns, "time")) is None or time.min() > 0.0:
+        return None
+    steps = {name: found for name in others if (found := _steps(columns, name)) is not None}
+    good = [name for name, found in steps.items() if len(found) == len(time) and found.min() > 0.0]
+    coarse = np.mean(time == 0.0) > REPEATS
+    good = [name for name in good if coarse or (_scatter(columns, name) or 0.0) < STEADY]
+    return good[0] if len(good) == 1 else None
+
+
+def _steps(columns: Columns, name: str) -> Array | None:
+    """Steps of a clock; None where it has none, or cells that are no times."""
+    try:
+        steps = np.diff(columns.clock(name)[0])
+    except DataError:
+        return None
+    return steps if steps.size and np.all(np.isfinite(steps)) else None
+
+
 def _is_empty(columns: Columns, name: str) -> bool:
     """Whether a clock has no value in any row, as those that a program's export lists and a device does not send."""
     column = columns.column(name)
@@ -150,11 +189,8 @@ def _note_unit(choice: Choice, is_clock: bool, unit: str | None) -> None:
 
 def _scatter(columns: Columns, name: str) -> float | None:
     """RMS scatter of a clock's steps over the median one; None where it does not always increase."""
-    try:
-        steps = np.diff(columns.clock(name)[0])
-    except DataError:
-        return None
-    if not steps.size or not np.all(np.isfinite(steps)) or steps.min() < 0.0 or np.median(steps) <= 0.0:
+    steps = _steps(columns, name)
+    if steps is None or steps.min() < 0.0 or np.median(steps) <= 0.0:
         return None
     median = float(np.median(steps))
     near = steps[steps < 3.0 * median]
@@ -218,17 +254,39 @@ def _stands(columns: Columns, name: str) -> bool:
     return bool(np.all(time == time[0]))
 
 
+def _counts(columns: Columns, name: str, time: Array) -> bool:
+    """Whether a column that increases counts rows, or by its name packets of all kinds, of which some are no rows."""
+    steps = np.diff(time)
+    if np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name):
+        return True
+    named = columns.named and COUNTER.search(plain(split(name)[0])) is not None and OF_TIME.search(name) is None
+    dated = any(EPOCH[0] < time[0] * size < EPOCH[1] for size in (1.0, 1e-3, 1e-6, 1e-9))
+    return named and bool(np.all(time == np.round(time))) and not dated
+
+
+def _doubt_of_skips(columns: Columns, choice: Choice, name: str) -> UnsureError | None:
+    """What to ask of whole numbers that go up by 1, now and then by more: ms of a quick log, or a counter that leaves out some."""
+    time, said = columns.clock(name)
+    steps = np.diff(time)
+    whole = said is None and bool(np.all(steps == np.round(steps)))
+    if not whole or steps.min() != 1.0 or np.median(steps) > FEW or OF_TIME.search(name) is not None:
+        return None
+    return UnsureError(
+        f"{columns.path.name}: column {name} goes up by 1 to {steps.max():.0f} from row to row: it may be in ms "
+        f"({1e3 / np.mean(steps):.4g} rows a second) or count rows or packets, of which some are missing",
+        [{"columns": {"time": name}, "units": {"time": "ms"}}, {"rate": "(rows a second)"}], choice.guesses,
+    )  # fmt: skip
+
+
 def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
     """Take the only column that increases steadily for the clock; a row counter is not a clock."""
-    found = []
-    for name in names[:MOST_COLUMNS]:
-        scatter = _scatter(columns, name)
-        if scatter is not None and scatter < STEADY:
-            steps = np.diff(columns.clock(name)[0])
-            counts = np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name)
-            found.append((name, bool(counts)))
-    clocks = _own(columns, choice, _as_long(columns, choice, [name for name, counts in found if not counts]))
+    steady = {name: scatter for name in names[:MOST_COLUMNS] if (scatter := _scatter(columns, name)) is not None}
+    counters = [name for name in steady if _counts(columns, name, columns.clock(name)[0])]
+    choice.counter = counters[0] if counters and columns.named else ""
+    found = [name for name, scatter in steady.items() if scatter < STEADY and name not in counters]
+    clocks = _own(columns, choice, _as_long(columns, choice, found))
     if len(clocks) == 1:
+        choice.doubt = _doubt_of_skips(columns, choice, clocks[0])
         choice.time = (clocks[0],)
         choice.guesses.append(
             Guess(

@@ -1,4 +1,4 @@
-"""Times that are written as a clock shows them, ``101259.98``: hours, minutes and seconds in one number."""
+"""Times that are written as a clock shows them, ``101259.98`` or ``101259980``: hours, minutes and seconds in one number."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ Array = NDArray[np.float64]
 
 FEWEST = 50  # rows, from which a log shows by itself what its numbers are
 DAY = 86400.0
+FACES = {"HHMMSS": 1.0, "HHMMSSmmm": 1e3, "HHMMSScc": 1e2, "HHMMSSuuuuuu": 1e6}  # and how many parts a second has
+
+
+def clock_face(raw: Array) -> tuple[str, float] | None:
+    """How numbers are written that are times of a clock, and how many parts a second has in them; None of others."""
+    return next(((written, parts) for written, parts in FACES.items() if is_clock_face(raw / parts)), None)
 
 
 def is_clock_face(raw: Array) -> bool:
@@ -16,7 +22,8 @@ def is_clock_face(raw: Array) -> bool:
     if len(raw) < FEWEST or not np.all((raw >= 0.0) & (raw < 240000.0)) or not np.all(raw % 100.0 < 60.0):
         return False
     steps, minutes = np.diff(raw), np.diff(raw // 100.0)
-    step = float(np.median(steps[minutes == 0.0])) if np.any(minutes == 0.0) else 0.0
+    inside = steps[(minutes == 0.0) & (steps > 0.0)]  # a computer that reads in bunches stamps several rows alike
+    step = float(np.median(inside)) if inside.size else 0.0
     jumps = steps[(minutes == 1.0) & (raw[1:] % 100.0 < 2.0) & (raw[:-1] % 100.0 > 58.0)]
     whole = np.any(minutes > 0.0) and np.all(raw % 10000.0 < 6000.0)
     return bool(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,10 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
 from truenorth.formats.behaviour import EPOCH, clock_readings, size
+from truenorth.formats.bunches import even_but_for_digits, jump_of, rows_are_lost
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.chosen import Choice
-from truenorth.formats.clock_face import FEWEST, is_clock_face, of_clock_face
+from truenorth.formats.clock_face import FEWEST, clock_face, of_clock_face
 from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError, take
 from truenorth.formats.layout import Layout, times, unit_factor
@@ -39,7 +39,7 @@ def clock_of_log(
     """Time in seconds: from the stamps, or made from the rate."""
     source = columns.path.name
     if not choice.time:
-        return _made(columns, layout, rows, guesses), layout
+        return _made(columns, layout, rows, guesses, choice.counter), layout
     raw, said = columns.clock(choice.time[0])
     if len(choice.time) == 2:
         raw = raw + choice.fraction * columns.read([choice.time[1]], False)[:, 0]
@@ -48,20 +48,21 @@ def clock_of_log(
     check_finite(raw[:, None], choice.labels[:1], source, columns.place)
     stated = layout.units.get("time", choice.units.get("time"))
     why = "the cells are no bare numbers"
-    if said is None and "time" not in layout.units and is_clock_face(raw):
+    if said is None and "time" not in layout.units and (face := clock_face(raw)) is not None:
+        written, part = face
         raw, said, why = (
-            of_clock_face(raw),
+            of_clock_face(raw / part),
             "times of day",
-            "written HHMMSS: no second reaches 60, each minute begins with a jump of 40",
+            f"written {written}: no second reaches 60, each minute begins with a jump of 40 s",
         )
     if stated == TENTH_MS and "time" not in layout.units and len(raw) > 2:
         stated = _fine(raw, source)
         if stated == "us":
             choice.device["gyro"] = ("deg/s", "an Xsens DOT's, whose clock counts microseconds, are in deg/s")
     if layout.rate is None:
-        _check_bunches(raw, said, stated, source, guesses)
+        _check_bunches(raw, said, stated, source, guesses, columns.place)
     elif np.all(np.diff(raw) >= 0.0) and raw[-1] > raw[0]:
-        return _evenly(raw, said, stated, layout.rate, source, guesses), layout
+        return _evenly(raw, said, stated, layout.rate, source, guesses, columns.place), layout
     check_order(raw, choice.labels[0], source, columns.place)
     if said is not None:
         guesses.append(Guess("time", said, why))
@@ -108,7 +109,7 @@ def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:
     return take("unit of time", readings, options, source, guesses).unit
 
 
-def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> Array:
+def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess], counter: str) -> Array:
     """Time of a log without any: the first row's interval ends at ``1 / rate``."""
     rate = layout.rate
     if rate is None:
@@ -123,8 +124,9 @@ def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> 
     elif rate is None:
         above = rate_above(columns)
         if above is None:
+            counted = f": column {counter!r} counts rows or packets" if counter else ""
             raise UsageError(
-                f"{columns.path.name}: no time in the log; name its column (columns: {{time: ...}}) or give the rate"
+                f"{columns.path.name}: no time in the log{counted}; name its column (columns: {{time: ...}}) or give the rate"
             )
         rate, line = above
         guesses.append(Guess("rate", f"{rate:g} Hz", f"the line {line!r} above the table", 1.0, {"rate": rate}))
@@ -133,20 +135,25 @@ def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> 
     return np.arange(1, rows + 1) / rate
 
 
-def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str, guesses: list[Guess]) -> None:
+def _check_bunches(
+    raw: Array, said: str | None, stated: str | None, source: str, guesses: list[Guess], place: Callable[[int], str]
+) -> None:
     """Refuse stamps of a computer that read several rows at once, or of few digits: their steps say nothing of the sampling."""
     steps = np.diff(raw)
     if len(steps) < FEWEST or steps.min() < 0.0 or raw[-1] <= raw[0]:
         return
     median, mean = float(np.median(steps)), float(np.mean(steps))
     uneven = float(np.mean((steps > 1.5 * median) | (steps == 0.0)))
-    rounded = steps.min() == 0.0 and _even_but_for_digits(raw, mean)
+    rounded = steps.min() == 0.0 and even_but_for_digits(raw, mean)
     if not rounded and (mean < BUNCHED * median or uneven < BUNCH_SHARE or len(stretches(raw)) > 1):
         return
+    if not rounded and rows_are_lost(raw):
+        return  # the stamps say where
     unit = 1.0 if said is not None else size(stated) if stated is not None else None
     if unit is None:
         readings = clock_readings(mean, float(raw[0]))
         unit = size(readings[0].unit) if readings else 1.0
+    _check_jump(raw, unit, source, place)
     rate = 1.0 / (mean * unit)
     whole = round(rate)
     rate = float(whole) if whole and abs(rate / whole - 1.0) < 0.003 else rate
@@ -162,18 +169,27 @@ def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str
     )  # fmt: skip
 
 
-def _even_but_for_digits(raw: Array, mean: float) -> bool:
-    """Whether stamps repeat for want of digits: there are no finer ones about them than half an interval, and the pace is one."""
-    spans = raw[10:] - raw[:-10]
-    if float(np.mean(np.abs(spans - 10.0 * mean) <= 1.01 * mean)) < 0.95:
-        return False
-    digits = max(0, math.floor(-math.log10(0.5 * mean)))  # of stamps that are as coarse as that
-    about = (raw[max(k - 10, 0) : k + 11] for k in np.flatnonzero(np.diff(raw) == 0.0))
-    coarse = [np.all(np.abs(stamps - np.round(stamps, digits)) < 1e-9 + 1e-6 * mean) for stamps in about]
-    return float(np.mean(coarse)) > 0.9  # digits may become fewer just there
+def _check_jump(raw: Array, unit: float, source: str, place: Callable[[int], str]) -> None:
+    """Refuse stamps that jump where their rate is asked for or given: neither the rows before nor those behind have it."""
+    found = jump_of(raw) if len(raw) > FEWEST else None
+    if found is not None:
+        row, rest = found
+        raise DataError(
+            f"{source}: {place(row + 1)}: the stamps jump by {(raw[row + 1] - raw[row]) * unit:.4g} s, while without that "
+            f"{1.0 / (rest * unit):.4g} rows a second come; expected rows of one run: keep the rows before or behind, or name "
+            "another column of the time"
+        )
 
 
-def _evenly(raw: Array, said: str | None, stated: str | None, rate: float, source: str, guesses: list[Guess]) -> Array:
+def _evenly(
+    raw: Array,
+    said: str | None,
+    stated: str | None,
+    rate: float,
+    source: str,
+    guesses: list[Guess],
+    place: Callable[[int], str],
+) -> Array:
     """Rows at a given rate, from where the stamps begin: no row is stamped before it was taken."""
     found = stretches(raw)
     if len(found) > 1:
@@ -186,6 +202,7 @@ def _evenly(raw: Array, said: str | None, stated: str | None, rate: float, sourc
     if said is None and stated is None:
         stated = min(("s", "ms", "us", "ns"), key=lambda unit: abs(np.log(steps * size(unit) * rate)))
     stamps = raw * (1.0 if said is not None or stated is None else size(stated))
+    _check_jump(stamps, 1.0, source, place)
     even = np.arange(len(raw)) / rate
     span = float(stamps[-1] - stamps[0])
     if abs(span / even[-1] - 1.0) > SPAN:

@@ -56,6 +56,8 @@ class Columns:
         What the clocks are that were read and start anew, by name: :meth:`clock` writes it.
     rows : mapping
         How many rows each column has, of a file of arrays, which may be those of several devices; empty for a table.
+    device : mapping
+        Units, and why, that what wrote the log always has, where the form of the log says what that was.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class Columns:
     whole: Mapping[tuple[str, ...], Array] = field(default_factory=dict)
     anew: dict[str, str] = field(default_factory=dict)
     rows: Mapping[str, int] = field(default_factory=dict)
+    device: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def clock(self, name: str) -> tuple[Array, str | None]:
         """A column of time, and what it holds: ``"dates"`` and ``"times of day"`` are in seconds, None is bare numbers.

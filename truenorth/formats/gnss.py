@@ -171,6 +171,8 @@ def _heading(found: Found) -> dict[str, Any]:
 
 def _geodetic(found: Found) -> dict[str, Any]:
     if not found.has("lat", "lon"):
+        if "lat" in found.values or "lon" in found.values:
+            raise found.missing("lon next to lat" if "lat" in found.values else "lat next to lon")
         return {}
     check_degrees(found)
     absent = np.full(len(found.values["time"]), np.nan)

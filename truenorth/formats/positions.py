@@ -52,13 +52,20 @@ def columns_of_positions(path: Path) -> Columns | None:
 
 
 def _rtklib(table: TextTable, header: str) -> Columns:
-    words = header.lstrip("% \t").split()
-    names = ["first", "second", *(RTKLIB.get(word, word) for word in words[1:])]
+    mark = table.dialect.delimiter
+    marked = mark is not None and mark in header  # the option out-fieldsep
+    words = [word.strip() for word in header.lstrip("% \t").split(mark if marked else None)]
+    # The time is a date and a time of day, or a week and its seconds; between other marks than blanks a date is one column.
+    whole = marked and len(words) == len(table.names)
+    names = [*(["time"] if whole else ["first", "second"]), *(RTKLIB.get(word, word) for word in words[1:])]
     if len(names) != len(table.names):
         raise DataError(
-            f"{table.path.name}: a header of {len(words)} words above rows of {len(table.names)}; expected one less"
+            f"{table.path.name}: a header of {len(words)} names above rows of {len(table.names)} columns; expected as many columns "
+            "as names, or one more, of the time"
         )
     table = replace(table, names=names)
+    if whole:
+        return Columns(table.path, names, table.read, table.column, table.place)
 
     def column(name: str) -> Any:
         if name != "time":

@@ -21,8 +21,10 @@ from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import unknown_key
 from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.checks import check_finite
+from truenorth.formats.clock_face import clock_face, of_clock_face
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
+from truenorth.formats.hemispheres import with_signs
 from truenorth.formats.names import clock_of
 from truenorth.formats.units import split, unit_in
 from truenorth.records import IN_ORDER, Late
@@ -54,7 +56,7 @@ class Quantity:
 
 Meaning = tuple[Quantity, float, str | None]  # a quantity, its sign, and the unit that the heading names
 
-TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc", "time_since_start_in"))
+TIME = Quantity("time", "time", "s", ("t", "timestamp", "time_stamp", "tow", "gps_time", "utc", "time_since_start_in"))
 
 
 @dataclass(frozen=True)
@@ -196,6 +198,8 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
         source += f", {' and '.join(taken)} of {', '.join(devices)}" if taken else ""
     factors = {ours: claim[0][1] for ours, claim in claims.items()}
     time, said = columns.clock(labels["time"])
+    if said is None and "time" not in stated and factors["time"] == 1.0 and (face := clock_face(time)) is not None:
+        time, said = of_clock_face(time / face[1]), "times of day"
     factors["time"] = 1.0 if said is not None else _of_epoch(time, factors["time"])
     numbers = list(dict.fromkeys(label for ours, label in labels.items() if ours != "time"))
     table = columns.read(numbers, True) if numbers else np.zeros((len(time), 0))
@@ -205,7 +209,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
             "those of one sensor"
         )
     values = {ours: table[:, numbers.index(label)] * factors[ours] for ours, label in labels.items() if ours != "time"}
-    values = {"time": time * factors["time"], **values}
+    values = {"time": time * factors["time"], **with_signs(columns, values)}
     found = Found(source, labels, values, factors, columns.place, frozenset(options.columns), frozenset(stated))
     found.require("time")
     if said is None and "time" not in stated and factors["time"] == 1.0:

@@ -19,7 +19,8 @@ def without_repeats(
 ) -> tuple[Columns, NDArray[np.intp] | None]:
     """The log without rows that repeat the row before, its time too, and which rows these are; None where there are none.
 
-    Where many rows do, the stamps have few digits, and such rows may be samples of their own: they stay, and are asked about.
+    Where many rows do, the stamps may have few digits, and such rows be samples of their own: they stay, and are asked about. Where
+    no two different rows have one time, and most values change from one time to the next, many rows are copies as well.
 
     Parameters
     ----------
@@ -35,12 +36,15 @@ def without_repeats(
     same &= np.all(accel[1:] == accel[:-1], axis=1)
     if not same.any():
         return columns, None
+    at_once = np.ones(rows - 1, dtype=bool)
     for name in choice.time:
         time = columns.clock(name)[0]
         if len(time) != rows:
             return columns, None
-        same &= time[1:] == time[:-1]
-    if not same.any() or np.mean(same) >= BUNCH_SHARE:
+        at_once &= time[1:] == time[:-1]
+    same &= at_once
+    copies = np.array_equal(same, at_once) and np.mean(np.any(np.diff(gyro[1:][~same], axis=0) != 0.0, axis=1)) > 0.5
+    if not same.any() or (np.mean(same) >= BUNCH_SHARE and not copies):
         return columns, None
     keep = np.flatnonzero(np.concatenate([[True], ~same]))
     first = columns.place(int(np.argmax(same)) + 1)

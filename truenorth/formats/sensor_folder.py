@@ -38,6 +38,8 @@ GRAVITY = re.compile(r"gravity(?:_?\d+)?")
 CLOCK = re.compile(r"time(?:_?stamps?)?")
 GNSS = re.compile(r"(?:location|gps|gnss)(?:_?(?:gps|gnss|fused|data|location))?(?:_?\d+)?")
 ODOMETER = re.compile(r"(?:odo(?:meter)?|wheel_?speed)(?:_?\d+)?")
+SENSOR_LOGGER_CLOCKS = {"time", "seconds_elapsed"}
+SENSOR_LOGGER = {"gyro": ("rad/s", "the app Sensor Logger writes rad/s, by the clocks of its files")}
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ def columns(folder: Path) -> Columns:
         clock,
     )
     values, signs = _specific_force(folder, accel)
-    return merged(folder, gyro, replace(accel, values=values), clock, times, signs)
+    table = merged(folder, gyro, replace(accel, values=values), clock, times, signs)
+    return replace(table, device=SENSOR_LOGGER) if set(gyro.clocks) >= SENSOR_LOGGER_CLOCKS else table
 
 
 def merged(path: Path, gyro: Sensor, accel: Sensor, clock: str, times: Array, words: str = "") -> Columns:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.formats.behaviour import (
     JUDGED,
+    LARGEST_RATE,
     SURE_GYRO,
     GyroFacts,
     Reading,
@@ -30,7 +31,7 @@ from truenorth.formats.choice import choose
 from truenorth.formats.chosen import Choice
 from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
-from truenorth.formats.counts import counts_above, orientation_above
+from truenorth.formats.counts import counts_above, device_above, orientation_above
 from truenorth.formats.guesses import UnsureError, in_words, take
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.formats.names import heading_of, plain
@@ -48,9 +49,6 @@ CONTRADICTED = 1.0  # of the logarithm, by which gyros turn gravity too far in a
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
-@np.errstate(
-    over="ignore", invalid="ignore"
-)  # a cell may hold 1e200: what is too large for any sensor is refused at the end
 def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     """The record of a log of named columns.
 
@@ -59,14 +57,32 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     DataError
         Bad data, with place and column; gravity in no unit; stamps in bunches.
     UnsureError
-        Two readings explain the log.
+        Two readings explain the log. What it offers holds what the caller has said: it may be given as it is.
     UsageError
         A unit of another dimension, or neither time nor rate.
     """
+    try:
+        return _record_of(columns, layout)
+    except UnsureError as error:
+        options = [_with_what_is_said(option, layout) for option in error.options]
+        raise UnsureError(error.question, options, error.guesses) from None
+
+
+def _with_what_is_said(option: Mapping[str, Any], layout: Layout) -> dict[str, Any]:
+    said: dict[str, Mapping[str, str]] = {"columns": layout.columns, "units": layout.units}
+    return {key: {**said[key], **value} if key in said else value for key, value in option.items()}
+
+
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # a cell may hold 1e200: what is too large for any sensor is refused at the end
+def _record_of(columns: Columns, layout: Layout) -> ImuRecord:
     source, columns = columns.path.name, with_angles(columns)
     choice = choose(columns, layout)
     guesses = choice.guesses
     gyro, accel = _sensors(columns, layout, choice)
+    if choice.doubt is not None:
+        raise choice.doubt
     columns, kept = without_repeats(columns, choice, gyro, accel)
     if kept is not None:
         gyro, accel = gyro[kept], accel[kept]
@@ -74,6 +90,7 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
         guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
     said_above = _said_above(columns, layout, choice, accel)
     choice.units = {**said_above, **choice.units}
+    choice.device |= {**columns.device, **device_above(columns.above, choice.labels[1:4])}
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
     kind, units = _units(time, gyro, accel, layout, choice, said_above, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
@@ -220,7 +237,9 @@ def _units(
 
 
 def _contradicts(facts: GyroFacts, unit: str) -> bool:
-    """Whether gyros in the unit that their device writes turn gravity too far, or not enough, for any error of theirs."""
+    """Whether gyros in the unit that their device writes turn too fast, or turn gravity too far, or not enough, for any error."""
+    if facts.largest * size(unit) > 2.0 * LARGEST_RATE:
+        return True
     return facts.turned and abs(np.log(facts.turning.best_scale * size(unit))) > CONTRADICTED
 
 

@@ -124,9 +124,8 @@ class TextTable:
         if self._whole is None:
             return None
         columns = [self._whole.column(str(self.names.index(name))) for name in names]
-        if not all(
-            pa.types.is_float64(c.type) for c in columns
-        ):  # a cast would load Arrow's kernels, which takes longer
+        # Whole numbers are read again: a cast would load Arrow's kernels, which takes longer, and lose the sign of -0.
+        if not all(pa.types.is_float64(column.type) for column in columns):
             return None
         return None if any(c.null_count for c in columns) and not gaps else to_numpy(columns)
 

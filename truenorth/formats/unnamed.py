@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import groupby
 
@@ -13,6 +14,7 @@ from truenorth.core.errors import DataError
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.behaviour import accel_readings, gravity_level, is_usual
 from truenorth.formats.chosen import MOST_COLUMNS, Choice, with_time
+from truenorth.formats.clock_face import FEWEST
 from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import Layout
@@ -29,8 +31,12 @@ VEHICLE = re.compile(r"(?<![a-z])(?:roll|pitch|yaw)(?=_?rate)|(?<=rate_)(?:roll|
 PART = re.compile(r"(.+)\[\d+\]")  # a column of an array, and no unit behind a name
 
 
-def by_behaviour(columns: Columns, layout: Layout) -> Choice:
-    """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three next to them."""
+def by_behaviour(columns: Columns, layout: Layout, given: Mapping[str, list[str]] | None = None) -> Choice:
+    """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three next to them.
+
+    The three columns of ``gyro`` or of ``accel`` may be `given`: then those of the other sensor are looked for.
+    """
+    known = dict(given or {})
     source, whole = columns.path.name, columns
     if columns.rows:  # of arrays those of the most rows: other devices' may come first, and be many
         most = max(columns.rows.values())
@@ -46,13 +52,22 @@ def by_behaviour(columns: Columns, layout: Layout) -> Choice:
     choice = Choice(None, (), [], named=False)
     if longest >= 3:
         choice = with_time(whole if "time" in layout.columns else columns, layout, choice)
-    skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
+    # No sensor's values increase in each of many rows: a counter's do, or those of a clock where the rate is given.
+    skip = set(choice.time) | {
+        name for name, v in numbers.items() if np.all(v[1:] > v[:-1] if longest > FEWEST else np.diff(v) == 1.0)
+    }
+    skip |= {name for three in known.values() for name in three}
     free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
     left_out = others_of(free, [list(three.values()) for three in _threes(free).values()]) if columns.named else set()
     blocks, forces = _sets(columns, choice, numbers, free, left_out, columns.named)
     surely = {name for name in left_out if not is_doubtful(name)}
-    if surely < left_out and (not forces or len(blocks) < 2):  # names that may be those of sensors all the same
+    if surely < left_out and (
+        not forces or len(blocks) < 2 - len(known)
+    ):  # names that may be those of sensors all the same
         blocks, forces = _sets(columns, choice, numbers, free, surely)
+    if known:
+        forces = [known["accel"]] if "accel" in known else forces
+        blocks = [*(blocks if "accel" in known else forces), *known.values()]
     from truenorth.formats.sensor_folder import hint
 
     if longest >= 3 and forces and len(blocks) < 2:

@@ -1,14 +1,18 @@
 """ArduPilot DataFlash (.bin, and the text made of it) by pymavlink: IMU and MAG of the first instance (axes FRD), GPS.
 
-Time is the board's, s.
+Time is the board's, s: ``TimeUS``, or ``TimeMS`` of versions before 3.3 (2015), whose GPS has the board's time as ``T`` and the
+receiver's time of week as ``TimeMS``.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from truenorth.core.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -19,7 +23,13 @@ TEXT = b"FMT,"
 
 
 def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
-    """Rates and specific forces; position and velocity (height above mean sea level, as the board has it); magnetic field."""
+    """Rates and specific forces; position and velocity (height above mean sea level, as the board has it); magnetic field.
+
+    Raises
+    ------
+    DataError
+        Messages without a time of the board.
+    """
     from pymavlink import DFReader
 
     with path.open("rb") as file:
@@ -31,11 +41,15 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
     try:
         while (m := log.recv_match(type=["IMU", "GPS", "MAG"])) is not None:
             if m.get_type() == "IMU" and getattr(m, "I", 0) == 0:
-                imu.append([m.TimeUS * 1e-6, m.GyrX, m.GyrY, m.GyrZ, m.AccX, m.AccY, m.AccZ])
+                imu.append([_time(m), m.GyrX, m.GyrY, m.GyrZ, m.AccX, m.AccY, m.AccZ])
             elif m.get_type() == "MAG" and getattr(m, "I", 0) == 0 and getattr(m, "Health", 1):
-                field.append([m.TimeUS * 1e-6, m.MagX, m.MagY, m.MagZ])
-            elif m.get_type() == "GPS" and getattr(m, "I", 0) == 0 and m.Status >= FIX_2D:
-                gnss.append([m.TimeUS * 1e-6, m.Lat, m.Lng, m.Alt, m.Spd, m.GCrs, -m.VZ, m.Status])
+                field.append([_time(m), m.MagX, m.MagY, m.MagZ])
+            elif part == "gnss" and m.get_type() == "GPS" and getattr(m, "I", 0) == 0 and m.Status >= FIX_2D:
+                gnss.append([_time(m), m.Lat, m.Lng, m.Alt, m.Spd, m.GCrs, -m.VZ, m.Status])
+    except _UntimedError as error:
+        raise DataError(
+            f"{path.name}: {error} have no time of the board among {error.fields}; expected TimeUS, TimeMS, or T of GPS"
+        ) from None
     finally:
         log.close()
     if is_text:  # whose first message the decoder gives twice
@@ -51,3 +65,19 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
             "VN [m/s]": speed * np.cos(np.radians(course)), "VU [m/s]": vu, "quality": quality,
         }  # fmt: skip
     return found
+
+
+class _UntimedError(Exception):
+    """Messages of a kind that say no time."""
+
+    def __init__(self, message: Any) -> None:
+        self.fields = ", ".join(message._fieldnames)
+        super().__init__(f"messages {message.get_type()}")
+
+
+def _time(message: Any) -> float:
+    """Of the board, s."""
+    for name, tick in (("TimeUS", 1e-6), ("T" if message.get_type() == "GPS" else "TimeMS", 1e-3)):
+        if (count := getattr(message, name, None)) is not None:
+            return float(count) * tick
+    raise _UntimedError(message)
