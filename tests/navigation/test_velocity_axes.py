@@ -4,10 +4,17 @@ import numpy as np
 import pytest
 
 from tests.runs import few_and_all
+from truenorth.aiding.aids import Gnss
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError
-from truenorth.navigation.velocity_axes import FORWARD_LEFT, check_axes
+from truenorth.core.position import Position
+from truenorth.errors.model import InsModel
+from truenorth.navigation.known import known_start
+from truenorth.navigation.velocity_axes import FORWARD_LEFT, check_axes, check_velocities
 from truenorth.records import GnssRecord, OdometerRecord, Trajectory, VelocityRecord
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import rest, simulate
+from truenorth.state.mounting import Mounting
 
 RATE, N = 5.0, 900
 T = 50.0 + np.arange(N) / RATE
@@ -92,3 +99,27 @@ def test_noise_gaps_and_rest_are_no_contradiction(runs):
     forward = np.where([False, True, False], record_of("body", EYE), np.nan)
     check_axes(VelocityRecord(T, forward), ins, 0.0, EYE)
     check_axes(VelocityRecord(T + 1e4, record_of("body", NED)), ins, 0.0, EYE)
+
+
+def test_a_vertical_bias_is_no_other_sign():
+    """An accelerometer's 8 mg change velocity by 1.6 m/s in 20 s: a drone that hardly climbs was said to count downwards."""
+    ins, _, v_n = track()
+    slow = np.column_stack([v_n[:, :2], 0.3 * np.sin(2.0 * np.pi * T / 90.0)])
+    biased = slow + 0.08 * (T - T[0])[:, None] * [0.0, 0.0, 1.0]
+    own = Trajectory(T, ins.C_nb, biased, ins.lat, ins.lon, ins.alt)
+    absent = np.full(N, np.nan)
+    check_axes(GnssRecord(T, absent, absent, absent, slow), own, 0.0, EYE)
+    with pytest.raises(DataError, match="counted downwards"):
+        check_axes(GnssRecord(T, absent, absent, absent, slow * [1.0, 1.0, -1.0]), own, 0.0, EYE)
+
+
+@pytest.mark.slow
+def test_a_start_whose_level_is_poor_does_not_run_away():
+    """Half a degree pushes by 0.09 m/s^2: after half an hour without aids the height was 12 km below, and refused."""
+    place, spec = Position.from_degrees(45.0, 1.0, 100.0), imu_spec("navigation")
+    record = simulate(rest(place, 0.3), rate=20.0, duration=1900.0, imu=spec, seed=1).record
+    still = known_start(record, place, spec, 0.3, 0.02, pitch=0.015, roll=-0.015, level_sigma=0.009)
+    time = np.arange(1.0, 1900.0)
+    same = np.ones(len(time))
+    gnss = GnssRecord(time, place.lat * same, place.lon * same, place.alt * same, np.zeros((len(time), 3)))
+    check_velocities(record, still, InsModel.from_spec(spec), [Gnss(gnss, Mounting())], 0.2)

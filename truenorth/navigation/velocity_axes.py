@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
 from truenorth.core.errors import DataError
+from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, Trajectory, VelocityRecord
@@ -98,8 +99,10 @@ def check_axes(
         )
     if not np.isfinite(velocity[rows, 2]).all():
         return
-    given, dv = measured.left(frame, np.eye(3), VERTICAL_STEP)
-    other, _ = measured.left(frame, DOWN, VERTICAL_STEP)
+    # A bias of the accelerometers changes velocity by as much in each step: 1.6 m/s of an industrial one.
+    given, dv = (x - x.mean(axis=0) for x in measured.left(frame, np.eye(3), VERTICAL_STEP))
+    other = measured.left(frame, DOWN, VERTICAL_STEP)[0]
+    other -= other.mean(axis=0)
     if _better(other[:, 2:], given[:, 2:], dv[:, 2:]):
         column = "VD" if frame == "navigation" else "v_down"
         raise DataError(
@@ -176,8 +179,11 @@ def check_velocities(record: ImuRecord, start: Start, model: InsModel, given: It
     if not seen:
         return
     sigma = np.sqrt(np.diag(start.P))
-    trusted = min(LONGEST, MOST_TILT / sigma[BG].max(), math.sqrt(2.0 * MOST_DRIFT / sigma[BA].max()))
-    if trusted < SHORTEST or sigma[PHI][:2].max() > MOST_TILT:
+    tilt = float(sigma[PHI][:2].max())
+    # A tilt pushes, too; once velocity is off by some 50 m/s the height runs away, to kilometres below the ground.
+    pushed = math.hypot(sigma[BA].max(), STANDARD_GRAVITY * tilt)
+    trusted = min(LONGEST, MOST_TILT / sigma[BG].max(), math.sqrt(2.0 * MOST_DRIFT / pushed))
+    if trusted < SHORTEST or tilt > MOST_TILT:
         return
     part = record.between(None, record.time[0] + trusted)
     free = navigate_track(part, start, model, interval=interval, every=1, covariance=False)
