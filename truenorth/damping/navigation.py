@@ -298,6 +298,12 @@ def _damped(
         again = run(about=run()["augmented"].x[:, MOTION])
         estimate = again["augmented"]
         x[start:] = estimate.x[:, MOTION]
+        if len(wholes) > 1:  # of a drift that may as well be slower than the filter takes it for
+            absent = np.asarray(np.isnan(calm.velocity[start:]).any(axis=1))
+            slower = widest([filter_bands(rest, each, kinds["augmented"], absent=absent) for each in wholes[1:]])
+            sigma = estimate.sigma.copy()
+            sigma[:, MOTION] = np.maximum(sigma[:, MOTION], slower.errors)
+            estimate = replace(estimate, sigma=sigma)
         return Found(x, None, estimate, None)
     model = MarineModel.from_spec(spec)
     one = Filter(model, whole.P0[:STATES, :STATES], reference.noise, relinearise=True)
