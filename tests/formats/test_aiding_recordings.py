@@ -4,6 +4,7 @@ import numpy as np
 
 from tests import recordings
 from truenorth.core.earth import radii
+from truenorth.formats import read_imu
 from truenorth.records import GnssRecord
 
 
@@ -54,3 +55,9 @@ def test_the_master_turns_as_its_slave_does():
     assert np.degrees(np.std(heading - course)) < 0.2
     turned = np.interp(master.time, slave.time, np.cumsum(slave.gyro[:, 2]))
     assert np.corrcoef(np.diff(turned), np.diff(heading))[0, 1] < -0.8  # heading is clockwise, z points up
+
+
+def test_the_unit_of_a_drive_by_how_quickly_a_car_turns():
+    """In deg/s it would turn by 0.6 deg/s at most, where its force turns by degrees; for a while that was asked about."""
+    imu, _, _ = recordings.car_mems_odo_gnss()
+    np.testing.assert_allclose(read_imu(recordings.DATA / "car_mems_odo_gnss" / "car_0_150s.npz").gyro, imu.gyro)

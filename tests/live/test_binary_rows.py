@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.live.test_devices import epoch, in_pieces
+from tests.live.test_devices import epoch, in_pieces, ubx_bytes
 from truenorth.formats.layout import Layout
 from truenorth.live.binary_rows import BinaryRows, binary_row
 from truenorth.live.decode import Decoder
@@ -89,3 +89,24 @@ def test_text_that_ends_as_a_row_begins():
     decoder = Decoder(Layout(columns={"time": "T"}), "test")
     found = np.vstack(in_pieces(text, decoder.feed, longest=3))
     np.testing.assert_allclose(found[:, 0], 0.01 * np.arange(20))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", ["rows", "a message"])
+@CHUNKS
+def test_messages_of_a_receiver_between_rows(chunk, first):
+    """Two bytes of a row that begin a message swallowed up to 64 KiB; a message in front made the stream the receiver's."""
+    fixes = [part for part in ubx_bytes(pytest.importorskip("pyubx2")) if part[2:4] == b"\x01\x07"][:EPOCHS]
+    rows, parts = rows_of(4), []
+    rows[150, 2] = np.frombuffer(b"\xb5\x62\x01\x07\xff\xff\xf0\x3f", dtype="<f8")[0]
+    for fix, second in zip(fixes, np.split(rows, EPOCHS), strict=True):
+        both = b"".join(as_bytes(second)), fix
+        parts += both if first == "rows" else both[::-1]
+    data = b"".join(parts)
+    decoder, feed, alone = Decoder(Layout(), "test"), GnssFeed(), GnssFeed()
+    listener = Listener(feed, "test", shared=True)
+    decoder.others.append(listener.hear)
+    found = np.vstack([decoder.feed(part) for part in chunks(data, chunk)])
+    assert np.array_equal(found, rows)
+    Listener(alone, "test").hear(b"".join(fixes))
+    assert np.array_equal(feed.rows, alone.rows, equal_nan=True)

@@ -14,7 +14,8 @@ A current that the sea has changes smoothly over minutes, and over hours it wand
 errors of the INS follow, whatever it is over hours. And what wanders in an hour may be the deflection of the vertical. So the same
 is asked of rows that are `SMOOTH` apart, on a sea without deflections: the faster of both walks is taken by a filter that
 estimates the drift. A method that does not is off by what the drift sums up to, and of both the slower one sums up to more: with a
-log that was off by .3 m/s all the time, taken for a current of an hour, position was seven sigmas off. Its bands hold both.
+log that was off by .3 m/s all the time, taken for a current of an hour, position was seven sigmas off. Its bands hold both, and so
+does the sigma of the filter that does.
 
 Source: F. Schweppe, "Evaluation of likelihood functions for Gaussian signals", IEEE Trans. Inf. Theory 11 (1965).
 """

@@ -53,6 +53,9 @@ ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less
 DECADE = 0.25  # decades by which those limits are soft
 SHAKEN = 3.0 * WORST_FORCE_WALK  # by motions that are quick from row to row
 MOVES = 8.0  # times the white noise of a row, that the gyros of a log at rest never show
+LIVELY = (
+    2.0 * DEG
+)  # rad/s: where the force turns, the sensor does as quickly as this at some time; what is shaken twice
 HINTS = 0.3  # share of gravity's turn that the gyros of a log without a rest explain by more than chance
 LEAST_HINT = 0.01  # likelihood of a unit that turns gravity too far, where quick motions hide most of its turn
 
@@ -279,6 +282,8 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
             )
         else:
             why = "usual"
+        if not turned and np.isfinite(facts.turning.best_agreement):
+            likely *= _below((2.0 if shaken else 1.0) * LIVELY, facts.largest * factor)
         if not turned and (facts.moves or shaken) and facts.turning.best_agreement > HINTS:
             scale = facts.turning.best_scale * factor
             likely *= _hint(facts.turning.best_agreement, scale)

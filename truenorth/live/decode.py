@@ -64,7 +64,8 @@ class Decoder:
         self._half = b""
         self._binary = BinaryRows()
         self._columns: _Columns | None = None
-        self._turn = np.eye(3) if layout.axes is None else body_axes(layout.axes)
+        self._given_turn = np.eye(3) if layout.axes is None else body_axes(layout.axes)
+        self._turn = self._given_turn
         self.broken = 0
         self.arrival_time = False
 
@@ -83,15 +84,16 @@ class Decoder:
         """
         for other in self.others:
             other(data)
-        rows: Sequence[Sequence[float]] = []
-        if self._messages is None:
-            rows, data = self._binary.feed(data)
-            decided = self._binary.seen or self._columns is not None
-            protocol = None if decided else protocol_of(self._half + data)
-            if protocol is not None:
-                data = self._half + data + self._binary.given_back()
-                self._messages = Messages(protocol, self._source)
-                self._turn = body_axes(self._layout.axes or self._messages.module.AXES)
+        rows: Sequence[Sequence[float]]
+        rows, data = self._binary.feed(data)
+        if self._binary.seen and self._messages is not None:  # those that came first are another sensor's
+            self._messages, self._columns, self._turn = None, None, self._given_turn
+        decided = self._binary.seen or self._columns is not None or self._messages is not None
+        protocol = None if decided else protocol_of(self._half + data)
+        if protocol is not None:
+            data, self._half = self._half + data + self._binary.given_back(), b""
+            self._messages = Messages(protocol, self._source)
+            self._turn = body_axes(self._layout.axes or self._messages.module.AXES)
         if self._messages is not None:
             result = self._table(self._messages.feed(data, "imu").get("imu", {}))
         else:

@@ -102,7 +102,7 @@ class Listener:
         DataError
             Text that is none of these.
         """
-        if self._shared and self._messages is None:
+        if self._shared:
             _, data = self._binary.feed(data)
         if self._messages is None and not self._header and not self._lines:
             protocol = protocol_of(self._half + data)
