@@ -38,3 +38,11 @@ def test_another_letter_is_named(tmp_path):
 def test_a_column_of_numbers_is_no_half(tmp_path):
     record = read_gnss(write(tmp_path / "log.csv", HEADS[2], "3", "4"))
     assert np.all(record.lat > 0.0)
+
+
+def test_a_letter_against_a_sign_is_refused(tmp_path):
+    """The letter won without a word: a log of Sydney with N in that column lay in the north."""
+    with pytest.raises(
+        DataError, match=r"line 2, column N/S: N, of a negative number; expected a number without a sign"
+    ):
+        read_gnss(write(tmp_path / "log.csv", HEADS[0], "N", "E", lat=-33.85))

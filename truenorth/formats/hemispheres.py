@@ -33,7 +33,7 @@ def with_signs(columns: Columns, values: Mapping[str, Array]) -> dict[str, Array
     Raises
     ------
     DataError
-        Another letter in such a column.
+        Another letter in such a column, or one that a sign contradicts.
     """
     signed = dict(values)
     for ours, (letters, name_of_half) in HALVES.items():
@@ -50,8 +50,12 @@ def with_signs(columns: Columns, values: Mapping[str, Array]) -> dict[str, Array
                 f"{columns.path.name}: {columns.place(wrong)}, column {name}: {cells[wrong]!r}; expected "
                 f"{letters[0]} or {letters[1]}, the half of the earth of the {'latitude' if ours == 'lat' else 'longitude'}"
             )
-        size = np.abs(values[ours])
-        signed[ours] = np.select(
-            [np.equal(halves, letters[0]), np.equal(halves, letters[1])], [size, -size], values[ours]
-        )
+        first, second = (np.equal(halves, letter) for letter in letters)
+        if (against := first & (values[ours] < 0.0)).any():
+            row = int(np.argmax(against))
+            raise DataError(
+                f"{columns.path.name}: {columns.place(row)}, column {name}: {letters[0]}, of a negative number; expected a number "
+                "without a sign, or none of these letters"
+            )
+        signed[ours] = np.where(second, -np.abs(values[ours]), values[ours])
     return signed
