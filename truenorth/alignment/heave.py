@@ -174,13 +174,14 @@ class Heave:
     def _misfits(self, slow: Array) -> Array:
         """(m,) of slow parts (m, n), with the likeliest white motion and walk of each, and any arm."""
         walked = EPOCH * self.walk**2 * np.diag(_walked(self._basis))
-        variance = (WHITE[:, None, None] ** 2 + WALKS[:, None] * walked).reshape(-1, len(walked))
-        misfit = np.sum(np.log(variance), axis=1)[:, None] + (1.0 / variance) @ (slow**2).T
-        # The covariance is V + A A' of the arm's columns A: by Woodbury, with I + A' V^-1 A of three rows.
-        weighed = self._of_arm / variance[..., None]
-        inner = np.eye(3) + self._of_arm.T @ weighed
-        along = np.swapaxes(weighed, 1, 2) @ slow.T
-        misfit += np.linalg.slogdet(inner)[1][:, None] - np.sum(along * np.linalg.solve(inner, along), axis=1)
+        weight = 1.0 / (WHITE[:, None, None] ** 2 + WALKS[:, None] * walked).reshape(-1, len(walked))
+        misfit = weight @ (slow**2).T - np.sum(np.log(weight), axis=1)[:, None]
+        # The covariance is V + A A' of the arm's columns A: by Woodbury, with L L' = I + A' V^-1 A of three rows.
+        arm = self._of_arm
+        L = np.linalg.cholesky(np.eye(3) + np.einsum("vn,ni,nj->vij", weight, arm, arm, optimize=True))
+        along = np.linalg.inv(L) @ ((weight[:, None] * arm.T) @ slow.T)
+        misfit += 2.0 * np.sum(np.log(np.diagonal(L, axis1=1, axis2=2)), axis=1)[:, None]
+        misfit -= np.einsum("vim,vim->vm", along, along)
         return np.asarray(misfit.min(axis=0))
 
 
