@@ -14,20 +14,25 @@ from typing import Any
 import numpy as np
 
 from truenorth.aiding.aids import Gnss
-from truenorth.estimate.slow_fit import fitted
+from truenorth.estimate.slow_fit import bounded_misfit, fitted
 from truenorth.navigation.plan import Plan
 from truenorth.quality.absolute import says_size
-from truenorth.quality.slow_aids import MOVES, Slow, under_way
+from truenorth.quality.slow_aids import FIXES, MOVES, Lasting, Slow, under_way
 from truenorth.state.evidence import Evidence
+from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
 COARSE = 1.0  # s, between predictions of a filter that looks for the receiver's errors
 PART = 900.0  # s of a log, that show them: some ten times as long as they last
 LONGEST = 4.0 * PART  # of a log with rests, until so much of it is under way
+QUIET = 0.5  # of the mean square of innovations, at rest, by errors as large as under way
 
 
 def fitted_under_way(plan: Plan, given: Mapping[str, Any], receiver: Gnss, track: Track) -> tuple[Plan, list[Evidence]]:
     """The plan with slow errors of the receiver that the log's first part makes likeliest, and what is new to be said.
+
+    By what it shows under way, where that speaks against what rest and drive together make likeliest by more than chance does, and
+    where the rest is quiet beyond it.
 
     Parameters
     ----------
@@ -50,7 +55,34 @@ def fitted_under_way(plan: Plan, given: Mapping[str, Any], receiver: Gnss, track
 
     def run(slow: Slow) -> Track:
         other = replace(short, slow=slow)
-        return under_way(other.run(other.sources(given)), track)
+        return other.run(other.sources(given))
 
-    slow, said = fitted(run, plan.slow, replace(plan, slow={}).sources(given), said=says_size(receiver.record))
+    def driven(slow: Slow) -> Track:
+        return under_way(run(slow), track)
+
+    aiding, says = replace(plan, slow={}).sources(given), says_size(receiver.record)
+    slow, said = fitted(run, plan.slow, aiding, said=says)
+    if under_way(track) is track:
+        return replace(plan, slow=slow), said
+    other, words = fitted(driven, plan.slow, aiding, said=says)
+    found = run(other)
+    by_all, by_drive = (bounded_misfit(seen.residuals) for seen in (driven(slow), under_way(found, track)))
+    if by_all - by_drive > limit("rival") and _is_quiet(under_way(found, track, rest=True)):
+        slow, said = _no_smaller(other, slow), words
     return replace(plan, slow=slow), said
+
+
+def _no_smaller(slow: Slow, other: Slow) -> Slow:
+    """These slow errors, no smaller than the others: what lasts at rest may be larger than what lasts under way."""
+
+    def larger(name: str, own: Lasting) -> Lasting:
+        sigma = own.group.sigma if name not in other else np.maximum(own.group.sigma, other[name].group.sigma)
+        return replace(own, group=replace(own.group, sigma=sigma))
+
+    return {name: larger(name, own) for name, own in slow.items()}
+
+
+def _is_quiet(track: Track) -> bool:
+    """Whether innovations of fixes are far smaller than they are said to be."""
+    fixes = next(residuals for residuals in track.residuals if residuals.name == FIXES)
+    return float(np.mean(fixes.nis[fixes.used] / fixes.rows[fixes.used])) < QUIET

@@ -99,10 +99,12 @@ def check_axes(
         )
     if not np.isfinite(velocity[rows, 2]).all():
         return
+    given, dv = measured.left(frame, np.eye(3), VERTICAL_STEP)
+    other, _ = measured.left(frame, DOWN, VERTICAL_STEP)
+    if not len(dv):
+        return
     # A bias of the accelerometers changes velocity by as much in each step: 1.6 m/s of an industrial one.
-    given, dv = (x - x.mean(axis=0) for x in measured.left(frame, np.eye(3), VERTICAL_STEP))
-    other = measured.left(frame, DOWN, VERTICAL_STEP)[0]
-    other -= other.mean(axis=0)
+    given, other, dv = (changes - changes.mean(axis=0) for changes in (given, other, dv))
     if _better(other[:, 2:], given[:, 2:], dv[:, 2:]):
         column = "VD" if frame == "navigation" else "v_down"
         raise DataError(

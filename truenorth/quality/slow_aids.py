@@ -115,7 +115,7 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasti
     return found, said
 
 
-def under_way(track: Track, moving: Track | None = None) -> Track:
+def under_way(track: Track, moving: Track | None = None, *, rest: bool = False) -> Track:
     """The track with innovations of a vehicle that moves, of sources that have many of one that stands as well; else the same one.
 
     Multipath of an antenna that stands changes as the satellites move, within minutes: its fixes seem to have next to no noise,
@@ -126,16 +126,19 @@ def under_way(track: Track, moving: Track | None = None) -> Track:
     track : Track
     moving : Track, optional
         By whose speed it moves; the track's own where left out.
+    rest : bool
+        Those of a vehicle that stands, in their place.
     """
     by = track if moving is None else moving
     moves = np.linalg.norm(by.v_n[:, :2], axis=1) > MOVES
     found = []
     for residuals in track.residuals:
-        there = np.interp(residuals.stamp, by.time, moves) > 0.5
-        some = min(np.sum(there), np.sum(~there)) >= LEAST_ROWS
-        found.append(
-            replace(residuals, **{name: getattr(residuals, name)[there] for name in BY_ROW}) if some else residuals
-        )
+        there = (np.interp(residuals.stamp, by.time, moves) > 0.5) != rest
+        if min(np.sum(there), np.sum(~there)) >= LEAST_ROWS:
+            rows = {name: getattr(residuals, name)[there] for name in BY_ROW}
+            found.append(replace(residuals, **rows))
+        else:
+            found.append(residuals)
     return track if all(map(is_, found, track.residuals)) else replace(track, residuals=tuple(found))
 
 
