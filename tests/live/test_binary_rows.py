@@ -66,6 +66,23 @@ def test_rows_are_not_taken_for_messages_of_a_device(chunk):
 
 
 @CHUNKS
+def test_damaged_rows_are_counted_whatever_the_chunks(chunk):
+    """By each stretch that is no row; where another sensor shares the stream, by the rows whose check does not fit."""
+    rows = rows_of(6, 300)
+    parts = [
+        part[:30] + bytes([part[30] ^ 1]) + part[31:] if k % 40 == 7 else part for k, part in enumerate(as_bytes(rows))
+    ]
+    parts[100] = b"noise" + parts[100]
+    damaged = len(range(7, 300, 40))
+    for others, lost in (([], damaged + 1), ([lambda data: None], damaged)):
+        decoder = Decoder(Layout(), "test")
+        decoder.others += others
+        found = np.vstack([decoder.feed(part) for part in chunks(b"".join(parts), chunk)])
+        assert len(found) == len(rows) - damaged
+        assert decoder.broken == lost
+
+
+@CHUNKS
 def test_sentences_between_rows(chunk):
     """A byte of a row that is the end of a line or a dollar sign cost the next sentence: 10 to 20 % of the fixes."""
     rows, data = rows_of(3), b""

@@ -235,7 +235,7 @@ def _aligned(
     elif method == "motion" and (hidden_from(task) or spread.and_more(found.sigma).heading > HIDDEN):
         tell(f"pass {number + 1}")
         task, guess, track, spread = of_level(task, found, first, spread)
-    answer = moving_answer(task, task.with_lasting_fixes(last or track), method, why, spread)
+    answer = moving_answer(task, task.with_lasting_fixes(last or track), method, why, spread, track)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []

@@ -23,8 +23,14 @@ from truenorth.state.layout import ACCEL_AXES, ANTENNA_ARM, BG, DP, GYRO_AXES, P
 from truenorth.state.track import Track
 
 
-def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread: Spread) -> Alignment:
-    """The alignment at the end of a track, before any verdict; `spread`: of heading, besides the filter's."""
+def moving_answer(
+    task: MovingTask, track: Track, method: str, why: str, spread: Spread, driven: Track | None = None
+) -> Alignment:
+    """The alignment at the end of a track, before any verdict; `spread`: of heading, besides the filter's.
+
+    `driven` shows how far the vehicle went, where the track itself is of a loop that feeds nothing back: its velocities are off by
+    up to metres a second as long as it does not know its heading.
+    """
     place = track.position[-1]
     sigma = track.sigma[-1]
     try:
@@ -42,8 +48,8 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
     covariance[2, 2] = min(covariance[2, 2], UNIFORM_SIGMA**2)
     sensor = "odometer" if isinstance(task.odometer, OdometerRecord) else "velocity log"
     mounting = None if task.odometer is None else (sensor, task.wheel.C_mb, task.wheel.lever_arm)
-    speed = np.linalg.norm(track.v_n, axis=1)
-    distance = float(np.trapezoid(speed, track.time))
+    way = track if driven is None else driven
+    distance = float(np.trapezoid(np.linalg.norm(way.v_n, axis=1), way.time))
     prior = np.sqrt(task.spec.bias_variance)
     prior[3:] = np.hypot(prior[3:], np.sqrt(task.spec.acting_variance(standing())))
     groups = (GYRO_AXES, ACCEL_AXES) if task.antenna.lever_arm.any() else (GYRO_AXES, ACCEL_AXES, ANTENNA_ARM)

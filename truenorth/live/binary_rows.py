@@ -33,10 +33,14 @@ class BinaryRows:
     ----------
     seen : bool
         A whole row has come.
+    damaged, stretches : int
+        Rows whose check does not fit, and stretches of other bytes, those among them, before a row.
     """
 
     def __init__(self) -> None:
         self.seen = False
+        self.damaged = self.stretches = 0
+        self._between = False  # other bytes have come since the last row
         self._half = b""
 
     def feed(self, data: bytes) -> tuple[list[tuple[float, ...]], bytes]:
@@ -51,15 +55,20 @@ class BinaryRows:
             sound = zlib.crc32(payload) == int.from_bytes(check, "little")
             end = start if sound else start + 1  # of a damaged one, rows may begin within it
             rest.append(data[at:end])
+            self._between |= end > at
             at = end
+            self.damaged += not sound
             if sound:
                 self.seen = True
+                self.stretches += self._between
+                self._between = False
                 rows.append(PAYLOAD.unpack(payload))
                 at = start + LENGTH
         if start < 0:  # the end may be the beginning of the next one
             start = next((len(data) - n for n in range(len(MAGIC) - 1, 0, -1) if data.endswith(MAGIC[:n])), len(data))
         start = max(start, at)
         rest.append(data[at:start])
+        self._between |= start > at
         self._half = data[start:]
         return rows, b"".join(rest)
 

@@ -66,8 +66,13 @@ class Decoder:
         self._columns: _Columns | None = None
         self._given_turn = np.eye(3) if layout.axes is None else body_axes(layout.axes)
         self._turn = self._given_turn
-        self.broken = 0
+        self._broken = 0
         self.arrival_time = False
+
+    @property
+    def broken(self) -> int:
+        """See above; what stands between binary rows may be another sensor's."""
+        return self._broken + (self._binary.damaged if self.others else self._binary.stretches)
 
     @property
     def kind(self) -> Kind:
@@ -97,9 +102,7 @@ class Decoder:
         if self._messages is not None:
             result = self._table(self._messages.feed(data, "imu").get("imu", {}))
         else:
-            if self._binary.seen:  # what stands between rows is another sensor's, or nobody's
-                self.broken += bool(data) and not self.others
-            else:
+            if not self._binary.seen:
                 self._half += data
                 rows = self._text()
             result = np.array(rows, dtype=np.float64).reshape(-1, 7)
@@ -133,7 +136,7 @@ class Decoder:
         if not line or line[0] in "#$/":  # comments, and NMEA sentences in between
             return None
         if not (line.isascii() and line.isprintable()):
-            self.broken += 1
+            self._broken += 1
             return None
         cells = [cell.strip() for cell in line.split("," if "," in line else ";" if ";" in line else None)]
         try:
@@ -142,13 +145,13 @@ class Decoder:
             if self._columns is None:
                 self._columns = self._from_header(cells)
             else:
-                self.broken += 1
+                self._broken += 1
             return None
         if self._columns is None:
             self._columns = self._without_header(len(numbers))
         columns = self._columns
         if len(numbers) != columns.width:
-            self.broken += 1
+            self._broken += 1
             return None
         values = [numbers[i] * factor for i, factor in zip(columns.at, columns.factor)]
         return values if columns.timed else [self._now(), *values]
