@@ -226,9 +226,7 @@ def _aligned(
     if passes > 1 and (roughly or (method == "motion" and has_fixes(task.gnss))):
         tell(f"pass {number + 1}")
         last = open_track(task, first, track)
-    if (
-        roughly and last is not None and float(last.sigma[-1, PHI][2]) < closed
-    ):  # one that feeds nothing back knows no more
+    if roughly and last is not None and last.sigma[-1, PHI][2] < closed:  # one that feeds nothing back knows no more
         last = None
     if last is not None:
         spread = bank.beyond(SURELY * float(last.sigma[-1, PHI][2]))

@@ -63,7 +63,7 @@ def put_in_order(
     return order, late
 
 
-def without_repeats(found: Found) -> Found:
+def taken_once(found: Found) -> Found:
     """A log without rows that are, in time and in all that is read, the row before: a logger wrote those twice.
 
     As it is where many are so.
@@ -87,7 +87,7 @@ def ordered(found: Found) -> Found:
     DataError
         As for :func:`put_in_order`.
     """
-    found = without_repeats(found)
+    found = taken_once(found)
     order, late = put_in_order(found.values["time"], found.labels["time"], found.source, found.place)
     if order is None:
         return found

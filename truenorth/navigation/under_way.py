@@ -24,7 +24,7 @@ from truenorth.state.track import Track
 
 COARSE = 1.0  # s, between predictions of a filter that looks for the receiver's errors
 PART = 900.0  # s of a log, that show them: some ten times as long as they last
-LONGEST = 4.0 * PART  # of a log with rests, until so much of it is under way
+LONGEST = 12.0 * PART  # of a log with rests, until so much of it is under way
 QUIET = 0.5  # of the mean square of innovations, at rest, by errors as large as under way
 
 
@@ -47,8 +47,8 @@ def fitted_under_way(plan: Plan, given: Mapping[str, Any], receiver: Gnss, track
     end = plan.record.time[0] + PART
     if under_way(track) is not track:  # it rests and drives
         moves = np.linalg.norm(track.v_n[:, :2], axis=1) > MOVES
-        driven = np.cumsum(moves * np.diff(track.time, prepend=plan.start.time))
-        last = min(int(np.searchsorted(driven, PART)), len(driven) - 1)
+        spent = np.cumsum(moves * np.diff(track.time, prepend=plan.start.time))
+        last = min(int(np.searchsorted(spent, PART)), len(spent) - 1)
         end = min(max(float(track.time[last]), end), plan.record.time[0] + LONGEST)
     part = plan.record.between(None, end)
     short = replace(plan, record=part, interval=max(plan.interval, COARSE), every=len(part))
