@@ -157,13 +157,20 @@ def _tried(passes: Iterable[tuple[Mounting, Callable[[], Track]]]) -> list[Momen
 
 
 def _best(found: Sequence[Moment], given: Mounting) -> tuple[Moment, list[float]]:
-    """The likeliest of them, and how much likelier each is than that: twice the logarithm of the ratio, zero at the most."""
+    """The likeliest of them, and how much likelier each is than that: twice the logarithm of the ratio, zero at the most.
+
+    Two are compared by the rows that both have used, so that three may be likelier than each other all round: each is taken once.
+    """
     best = min(found, key=lambda one: abs(one.antenna.latency - given.latency))
-    ratios = [_ratio(best, one, given) for one in found]
+    ratios, taken = [_ratio(best, one, given) for one in found], [best]
     while max(ratios) > 0.0:
-        best = found[int(np.argmax(ratios))]
+        likelier = found[int(np.argmax(ratios))]
+        if any(likelier is one for one in taken):
+            break
+        best = likelier
         ratios = [_ratio(best, one, given) for one in found]
-    return best, ratios
+        taken.append(best)
+    return best, [min(ratio, 0.0) for ratio in ratios]
 
 
 def _apart(found: Sequence[Moment], ratios: Sequence[float]) -> list[Moment]:
