@@ -28,10 +28,10 @@ def test_three_that_are_likelier_than_each_other_all_round(monkeypatch, given):
     found = moments([0.0, 0.1, 0.2])
 
     def ratio(one, other, _):
-        i, k = (found.index(each) for each in (one, other))
+        i, k = (round(10.0 * each.antenna.latency) for each in (one, other))
         return {0: 0.0, 1: 5.0, 2: -5.0}[(k - i) % 3]
 
     monkeypatch.setattr(moment, "_ratio", ratio)
     best, ratios = _best(found, Mounting(latency=given))
-    assert best in found
+    assert any(best is one for one in found)
     assert max(ratios) == 0.0
