@@ -70,7 +70,7 @@ def _facts(result: Navigation) -> list[tuple[str, str]]:
     return [
         (
             _("Log"),
-            _("{source}, {start:.5g} to {stop:.5g} {unit}").format(
+            _("{source}, {start:.9g} to {stop:.9g} {unit}").format(
                 source=result.source,
                 start=round(float(clock(result.time[0])), 9),  # the start less a step may leave 1e-15
                 stop=clock(result.time[-1]),

@@ -51,7 +51,8 @@
       hovermode: layout.hovermode || "x unified", hoverlabel: { bgcolor: read("--paper"), font: { color: ink } },
       legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, itemsizing: "constant", ...(layout.legend || {}) } };
     for (const key of Object.keys(found)) if (/^[xy]axis/.test(key)) {
-      found[key] = { ...axis, ...(found[key].type === "log" ? { tickformat: "~g" } : {}), ...found[key] };  // 0.2, not a small 2
+      const whole = key[0] === "x" ? { exponentformat: "none" } : {};  // a time of the week is 152500, not 1.525 times something
+      found[key] = { ...axis, ...whole, ...(found[key].type === "log" ? { tickformat: "~g" } : {}), ...found[key] };  // 0.2, not a small 2
       // With a standoff the title keeps clear of the widest figure, and the margin grows with it.
       if (found[key].title) found[key].title = { ...found[key].title, font: { size }, ...(key[0] === "y" ? { standoff: paper ? 2 : 8 } : {}) };
     }
