@@ -53,9 +53,7 @@ ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less
 DECADE = 0.25  # decades by which those limits are soft
 SHAKEN = 3.0 * WORST_FORCE_WALK  # by motions that are quick from row to row
 MOVES = 8.0  # times the white noise of a row, that the gyros of a log at rest never show
-LIVELY = (
-    2.0 * DEG
-)  # rad/s: where the force turns, the sensor does as quickly as this at some time; what is shaken twice
+LIVELY = 2.0 * DEG  # rad/s: as quickly as this turns at some time what turns its force; what is shaken, twice
 HINTS = 0.3  # share of gravity's turn that the gyros of a log without a rest explain by more than chance
 LEAST_HINT = 0.01  # likelihood of a unit that turns gravity too far, where quick motions hide most of its turn
 
