@@ -45,6 +45,7 @@ USUAL_ARM = 1.0  # m, at least, of an antenna of which nobody says where it is
 SHOWN = SEEN**2
 BY_CHANCE = 2.0  # sigmas of what such a ratio scatters by
 FAR = 3.5  # sigmas of the delay, as far as it is tried
+EDGE = 2.0  # rad of the shake: so near the farthest ones the likeliest stands for a delay that is farther still
 MOST = 60  # delays
 BEGINS = 20.0  # s, in which a filter comes to know level and heading
 PART = 240.0  # s on the move, that tell them apart
@@ -135,6 +136,8 @@ def _is_shown(found: Sequence[Moment], given: Mounting, quick: float) -> bool:
     A receiver whose velocities are means over its interval, or whose antenna does not shake with an IMU on its engine, does not.
     """
     best, ratios = _best(found, given)
+    if min(abs(_step(one, best)) for one in (found[0], found[-1])) < EDGE / quick:
+        return False  # a delay beyond those that are tried is left to the passes: they go as far as it takes
     period = 2.0 * math.pi / quick
     near = [(r, one) for one, r in zip(found, ratios, strict=True) if abs(_step(one, best)) < 0.75 * period]
     worst, other = min(near, key=lambda pair: pair[0])
