@@ -208,3 +208,13 @@ def test_a_time_of_a_vbox_that_is_infinite(tmp_path, time):
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(DataError, match=r"drive.vbo: line \d+"):
         read_gnss(path)
+
+
+def test_an_infinite_number_of_satellites_of_a_vbox_is_no_fix(tmp_path):
+    """It was a warning of NumPy: of a row without a fix nothing is left."""
+    path = vbo(tmp_path / "drive.vbo")
+    lines = path.read_text().splitlines()
+    k = lines.index("[data]") + 3
+    lines[k] = " ".join(["9" * 400, *lines[k].split()[1:]])
+    path.write_text("\n".join(lines) + "\n")
+    assert np.isfinite(read_gnss(path).lat).sum() == 9

@@ -72,6 +72,7 @@ def columns(path: Path) -> Columns:
         )
     ours = dict(zip(_names(theirs, table, lines), table.names))
 
+    @np.errstate(invalid="ignore")  # a cell may hold 1e400: what is infinite is no number of satellites
     def read(names: Sequence[str], gaps: bool) -> Array:
         plain = ["sats" if name == "quality" else ours[name] for name in names]
         values = table.read(
