@@ -9,6 +9,7 @@ from tests.navigation.test_navigate import PLACE, SIGMA, SPEC, fixes
 from truenorth.aiding.aids import Gnss
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.navigation import Mounting, Start, navigate
+from truenorth.records import GnssRecord
 from truenorth.simulation import simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, straight, turn
@@ -63,3 +64,17 @@ def test_noise_of_fixes_is_that_of_the_drive(seed):
     assert places.rejected < 0.05 * len(places.time)
     true = motion.states(found.time)
     assert np.abs((found.v_n - true.v_n) / found.v_sigma)[1:].max() < 4.0
+
+
+@pytest.mark.slow
+def test_a_receiver_without_places_rests_and_drives():
+    """There are no fixes whose rest could be quiet."""
+    motion, record, start = about_town(0)
+    time, rng = np.arange(0.5, record.time[-1], 1.0), np.random.default_rng(5)
+    absent, slow = np.full(len(time), np.nan), np.zeros((len(time), 3))
+    for k in range(1, len(time)):
+        slow[k] = np.exp(-0.1) * slow[k - 1] + 0.2 * np.sqrt(1.0 - np.exp(-0.2)) * rng.standard_normal(3)
+    v = motion.states(time).v_n + slow + np.where(time < REST, 0.01, 0.1)[:, None] * rng.standard_normal(slow.shape)
+    sigma = np.full(slow.shape, 0.25)
+    gnss = GnssRecord(time, absent, absent, absent, v_n=v, velocity_sigma=sigma, source="gnss.csv")
+    assert navigate(record, start, aid=Gnss(gnss, Mounting()), imu=SPEC).status == "navigated"

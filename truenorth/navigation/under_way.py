@@ -83,6 +83,10 @@ def _no_smaller(slow: Slow, other: Slow) -> Slow:
 
 
 def _is_quiet(track: Track) -> bool:
-    """Whether innovations of fixes are far smaller than they are said to be."""
-    fixes = next(residuals for residuals in track.residuals if residuals.name == FIXES)
-    return float(np.mean(fixes.nis[fixes.used] / fixes.rows[fixes.used])) < QUIET
+    """Whether innovations of fixes are far smaller than they are said to be; not of a receiver without any."""
+    used = [
+        residuals.nis[residuals.used] / residuals.rows[residuals.used]
+        for residuals in track.residuals
+        if residuals.name == FIXES
+    ]
+    return bool(used and used[0].size and np.mean(used[0]) < QUIET)
