@@ -13,6 +13,7 @@ import yaml
 
 from tests.campaign.test_kills import alive, children_of
 from tests.campaign.test_plan import PLAN
+from truenorth.campaign import execution
 from truenorth.campaign.execution import pool_of, uninterrupted
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
@@ -88,3 +89,24 @@ def test_two_interrupts_while_workers_start(tmp_path, seed):
     while any(alive(worker) for worker in workers) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not any(alive(worker) for worker in workers)
+
+
+def test_an_interrupt_that_leaves_a_lock_behind_is_an_interrupt(monkeypatch):
+    """A second one within Python's own wait ended as an internal error: "release unlocked lock"."""
+
+    def twice(*_, **__):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise RuntimeError("release unlocked lock")  # noqa: B904 (as Python does)
+
+    monkeypatch.setattr(execution, "wait", twice)
+    with pytest.raises(KeyboardInterrupt):
+        execution._first_of([])
+
+    def broken(*_, **__):
+        raise RuntimeError("another one")
+
+    monkeypatch.setattr(execution, "wait", broken)
+    with pytest.raises(RuntimeError, match="another one"):
+        execution._first_of([])

@@ -7,7 +7,7 @@ import platform
 import signal
 import threading
 import time
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -93,8 +93,7 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Done:
                         with uninterrupted():  # the first task starts the workers
                             future = pool.submit(work, mapping, block)
                         under_way[future] = block
-                    done, _ = wait(under_way, return_when=FIRST_COMPLETED)
-                    for future in done:
+                    for future in _first_of(under_way):
                         result = future.result()
                         yield under_way.pop(future), result
             except BrokenProcessPool:
@@ -107,6 +106,19 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Done:
                             f"{block.case}; is there enough memory? Fewer `workers` or a smaller block need less"
                         ) from None
                 left = lost + left
+
+
+def _first_of(under_way: Collection[Future[Any]]) -> Collection[Future[Any]]:
+    """Those that are done, one at least.
+
+    A second interrupt while Python leaves its wait after the first one finds a lock that is not taken: it is that interrupt still.
+    """
+    try:
+        return wait(under_way, return_when=FIRST_COMPLETED).done
+    except RuntimeError as error:
+        if isinstance(error.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from None
+        raise
 
 
 @contextmanager
