@@ -19,7 +19,9 @@ def clock_face(raw: Array) -> tuple[str, float] | None:
 
 def is_clock_face(raw: Array) -> bool:
     """Whether numbers are hours, minutes and seconds as ``101259.98``: no second reaches 60, and each minute begins with a jump."""
-    if len(raw) < FEWEST or not np.all((raw >= 0.0) & (raw < 240000.0)) or not np.all(raw % 100.0 < 60.0):
+    if len(raw) < FEWEST or not (raw.min() >= 0.0 and raw.max() < 240000.0) or raw.min() // 100.0 == raw.max() // 100.0:
+        return False  # no minute begins
+    if not np.all(raw % 100.0 < 60.0):
         return False
     steps, minutes = np.diff(raw), np.diff(raw // 100.0)
     inside = steps[(minutes == 0.0) & (steps > 0.0)]  # a computer that reads in bunches stamps several rows alike

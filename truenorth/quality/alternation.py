@@ -18,12 +18,12 @@ and mains hum at a fifth of some rate as well, seldom at two fifths, too, and as
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import row_blocks
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
 from truenorth.quality.other_counts import counts_in_turn, has_many_levels
@@ -43,19 +43,31 @@ ROUNDING = 1e-12  # of the largest value: differences of a channel that stands o
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
+class _Stretches(NamedTuple):
+    """What n stretches of a log say: means and products of what the channels do once in so many rows, and of the rest of them."""
+
+    quick: Any  # (n, 3) means of what alternates
+    slow: Array  # (n, 3) means of the rest, f
+    turns: Any  # (n, 3) sums of q x f
+    products: Array  # (3, 3, n) sums of f f'
+    periods: int  # of a stretch
+
+
 def alternation(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> Array:
     """(3,) size of what each accelerometer does once in so many rows, of two: half of what one has more than the other.
 
     Zero where chance may give it.
     """
-    return _alternation(record, _of_channels(record, period, stretches))
+    return _alternation(record, _stretches(record, period, stretches))
 
 
-def _alternation(record: ImuRecord, quick: Sequence[Any]) -> Array:
-    """The same, of what the channels do once in so many rows."""
+def _alternation(record: ImuRecord, seen: _Stretches | None) -> Array:
+    """The same, of what the stretches say."""
     found = np.zeros(3)
-    for channel, (x, q) in enumerate(zip(record.accel.T, quick)):
-        means = q.mean(axis=1)
+    if seen is None:
+        return found
+    for channel, x in enumerate(record.accel.T):
+        means = seen.quick[:, channel]
         size = float(abs(means.mean()))
         if _keeps(means) and size > COUNTS * _step(x):
             found[channel] = size
@@ -64,7 +76,7 @@ def _alternation(record: ImuRecord, quick: Sequence[Any]) -> Array:
 
 def turn_in_turn(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> float:
     """By how much (rad) forces of one in so many rows are turned against the mean; zero where not all of the log shows it."""
-    return _off_the_mean(period) * _turn(record, _of_channels(record, period, stretches), period, stretches)
+    return _off_the_mean(period) * _turn(record, _stretches(record, period, stretches))
 
 
 def _off_the_mean(period: int) -> float:
@@ -75,57 +87,66 @@ def _off_the_mean(period: int) -> float:
     return max(1.0, 0.5 * (period - 1.0))
 
 
-def _turn(record: ImuRecord, q: Sequence[Any], period: int, stretches: int) -> float:
-    """The same, of what the channels do once in so many rows."""
-    if not q:
+def _turn(record: ImuRecord, seen: _Stretches | None) -> float:
+    """The same, of what the stretches say."""
+    if seen is None:
         return 0.0
-    length, columns = _length(record, period, stretches), record.accel.T
-    f = [_smooth(x, length, period, stretches) for x in columns]
     # Of each stretch, as A: normal equations of q = theta x f.
-    z = np.stack([(f[j] * q[k] - f[k] * q[j]).sum(axis=1) for j, k in ((1, 2), (2, 0), (0, 1))], axis=1)
-    products = np.array([[(a * b).sum(axis=1) for b in f] for a in f])
+    z, products = seen.turns, seen.products
     square = np.einsum("iik->k", products)
     A = square[:, None, None] * np.eye(3) - products.transpose(2, 0, 1)
     theta = np.linalg.pinv(A.sum(axis=0), rcond=limit("alternating turn"), hermitian=True) @ z.sum(axis=0)
-    force = math.sqrt(float(square.sum()) / f[0].size)
+    force = math.sqrt(float(square.sum()) / (len(z) * seen.periods))
     shows, expected = np.real(z @ theta.conj()), np.real(np.einsum("i,kij,j->k", theta.conj(), A, theta))
     size = float(np.linalg.norm(theta))
     # A vibration alternates where no force is turned, too.
-    left = np.stack([x.mean(axis=1) for x in q], axis=1) - np.cross(
-        theta, np.stack([x.mean(axis=1) for x in f], axis=1)
-    )
-    explains = float(np.sum(abs(left) ** 2)) < float(expected.sum()) / q[0].shape[1]
+    left = seen.quick - np.cross(theta, seen.slow)
+    explains = float(np.sum(abs(left) ** 2)) < float(expected.sum()) / seen.periods
     if not (explains and _shown(shows, expected)):
         return 0.0
-    return size if size * force > COUNTS * max(_step(x) for x in columns) else 0.0
+    return size if size * force > COUNTS * max(_step(x) for x in record.accel.T) else 0.0
 
 
-def _of_channels(record: ImuRecord, period: int, stretches: int, times: int = 1) -> list[Any]:
-    """What each accelerometer does so many times in the period, as of :func:`_periodic`; nothing of a log that is too short."""
-    length = _length(record, period, stretches)
-    return [] if length < SHORTEST else [_periodic(x, length, period, stretches, times) for x in record.accel.T]
+def _stretches(record: ImuRecord, period: int, stretches: int, times: int = 1) -> _Stretches | None:
+    """What stretches say of what happens so many times in the period; None of a log that is too short.
+
+    Of a long log some stretches at a time are in memory.
+    """
+    length = (len(record) - 4) // stretches // period * period
+    if length < SHORTEST:
+        return None
+    parts = []
+    for rows in row_blocks(stretches * length, length):
+        columns = [x[rows.start : rows.stop + 4] for x in record.accel.T]
+        q = [_periodic(x, period, times).reshape(-1, length // period) for x in columns]
+        f = [_smooth(x, period).reshape(-1, length // period) for x in columns]
+        parts.append(
+            (
+                np.stack([x.mean(axis=1) for x in q], axis=1),
+                np.stack([x.mean(axis=1) for x in f], axis=1),
+                np.stack([(f[j] * q[k] - f[k] * q[j]).sum(axis=1) for j, k in ((1, 2), (2, 0), (0, 1))], axis=1),
+                np.array([[(a * b).sum(axis=1) for b in f] for a in f]).transpose(2, 0, 1),
+            )
+        )
+    quick, slow, turns, products = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return _Stretches(quick, slow, turns, products.transpose(1, 2, 0), length // period)
 
 
-def _length(record: ImuRecord, period: int, stretches: int) -> int:
-    """Rows of a stretch, a multiple of the period."""
-    return (len(record) - 4) // stretches // period * period
-
-
-def _periodic(x: Array, length: int, period: int, stretches: int, times: int = 1) -> Any:
-    """(stretches, length / period) size and phase of what a channel does so many times in the period, of two rows a real number."""
+def _periodic(x: Array, period: int, times: int) -> Any:
+    """Size and phase of what a channel does so many times in each period, of two rows a real number."""
     turn = 2.0 * math.pi * times / period
     quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / (2.0 * math.sin(0.5 * turn)) ** 4
-    rows = quick[: stretches * length].reshape(stretches, length // period, period)
+    rows = quick.reshape(-1, period)
     if period == 2:
-        return 0.5 * (rows[:, :, 0] - rows[:, :, 1])
+        return 0.5 * (rows[:, 0] - rows[:, 1])
     return rows @ np.exp(-1j * turn * np.arange(period)) * (2.0 / period)
 
 
-def _smooth(x: Array, length: int, period: int, stretches: int) -> Array:
+def _smooth(x: Array, period: int) -> Array:
     """The rest of it, at the same rows."""
     slow = (x[:-4] + 4.0 * x[1:-3] + 6.0 * x[2:-2] + 4.0 * x[3:-1] + x[4:]) / 16.0
-    rows = slow[: stretches * length].reshape(stretches, length // period, period)
-    return np.asarray(sum(rows[:, :, i] for i in range(period)) / period)
+    rows = slow.reshape(-1, period)
+    return np.asarray(sum(rows[:, i] for i in range(period)) / period)
 
 
 def _keeps(means: Any) -> bool:
@@ -181,7 +202,8 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
 def _by_means(record: ImuRecord, period: int) -> float:
     """The same of rows that have other counts: what their means say, with its sigma, chance or not."""
     unit = record.interval if record.kind == "increments" else 1.0
-    means = [q.mean(axis=1) for q in _of_channels(record, period, STRETCHES[0])]
+    seen = _stretches(record, period, STRETCHES[0])
+    means = [] if seen is None else seen.quick.T
     square = sum(float(abs(x.mean()) ** 2 + x.var() / len(x)) for x in means)
     return _off_the_mean(period) * math.sqrt(square) / GRAVITY_EQUATOR / unit
 
@@ -194,9 +216,9 @@ def _turned(record: ImuRecord, period: int, stretches: int) -> float:
     unit = record.interval if record.kind == "increments" else 1.0
     least = math.inf
     for times in range(1, period // 2 + 1):
-        quick = _of_channels(record, period, stretches, times)
-        offset = float(np.linalg.norm(_alternation(record, quick)))
-        least = min(least, max(offset / GRAVITY_EQUATOR / unit, _turn(record, quick, period, stretches)))
+        seen = _stretches(record, period, stretches, times)
+        offset = float(np.linalg.norm(_alternation(record, seen)))
+        least = min(least, max(offset / GRAVITY_EQUATOR / unit, _turn(record, seen)))
         if least == 0.0:
             break
     return _off_the_mean(period) * least

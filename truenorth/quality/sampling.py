@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
 from truenorth.quality.again import Again, rows_again
+from truenorth.quality.clipped import PERIOD, ROUNDING, clipped_at, finest, largest, roughness
 from truenorth.quality.packets import exchanged_packets
 from truenorth.quality.repeats import chance_of_repeat, repeats_of
 from truenorth.quality.stuck import stands_alone
@@ -22,20 +22,10 @@ from truenorth.state.limits import limit
 Array = NDArray[np.float64]
 Severity = Literal["error", "warning", "note"]
 
-ROUNDING = 1e-10  # of a sensor's largest value: what varies by less has no noise
 NOISELESS = 1e-7  # of the same: noise and quantum of every sensor are larger
 FEWEST = 20  # rows that say whether there is noise
 FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
-SATURATED_RUN = 3  # rows at the extreme, one after the other ...
-RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off, ...
-TAIL, TAIL_LEVELS = 0.25, 20  # ... and more where a tail of so many levels, in this part of the spread, is cut off
-# Counts of a period of a pulse train, where both edges of two signals are counted: the four are not alike, so that of a sensor
-# at rest every fourth value may be full and those between empty. Values are compared over whole periods.
-PERIOD = 4
 AROUND, WITHIN = 4, 3.0  # stretches to either side that a run is compared with, and their standard deviations
-OFF = 0.01  # of a step, by which an extreme misses what all other values are multiples of
-LATTICE = 1e-4  # of a step, by which those may
-FEWEST_LEVELS = 3  # values that show a step twice
 
 
 @dataclass(frozen=True)
@@ -252,7 +242,7 @@ def _loses(values: Array, first: int, rows: int) -> bool:
     if not len(stretches):
         return True
     sums = stretches.sum(axis=1)
-    expected = PERIOD * _finest(stretches) + WITHIN * float(np.std(sums))
+    expected = PERIOD * finest(stretches) + WITHIN * float(np.std(sums))
     return not abs(rows * float(values[first]) - float(sums.mean())) <= expected
 
 
@@ -277,11 +267,11 @@ def _without_noise(data: Sequence[Array], same: NDArray[np.bool_]) -> bool:
     inside = changes[1:] & changes[:-1]
     if np.count_nonzero(inside) < FEWEST:
         return False
-    size = np.repeat([_largest(data[:3]), _largest(data[3:])], 3)
-    rough = np.array([np.median(np.abs(np.diff(x, n=2))[inside]) for x in data])
+    size = np.repeat([largest(data[:3]), largest(data[3:])], 3)
+    rough = np.array([np.median(roughness(x)[inside], overwrite_input=True) for x in data])
     steps = (np.abs(np.diff(x)) for x in data)
-    finest = np.array([np.min(step, initial=np.inf, where=step > 0.0) for step in steps])
-    return bool(np.all(rough <= NOISELESS * size) and np.any(finest <= NOISELESS * size))
+    smallest = np.array([np.min(step, initial=np.inf, where=step > 0.0) for step in steps])
+    return bool(np.all(rough <= NOISELESS * size) and np.any(smallest <= NOISELESS * size))
 
 
 def _is_dead(data: Sequence[Array], channel: int) -> bool:
@@ -290,100 +280,24 @@ def _is_dead(data: Sequence[Array], channel: int) -> bool:
     Where none of the three has noise beyond rounding, the log comes from a simulation without noise.
     """
     sensor = data[:3] if channel < 3 else data[3:]
-    size = _largest(sensor)
+    size = largest(sensor)
     return size == 0.0 or bool(max(np.ptp(x) for x in sensor) > ROUNDING * size)
 
 
-def _largest(sensor: Sequence[Array]) -> float:
-    return max(float(np.abs(x).max()) for x in sensor)
-
-
 def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]) -> NDArray[np.intp]:
-    """Rows at an extreme that is piled up: clipping breaks the fall of the tail, a coarse quantum does not."""
+    """Rows of each channel at which it is clipped."""
     rows = np.zeros(6, dtype=np.intp)
     unit = ("rad/s", "m/s^2") if record.kind == "rates" else ("rad a row", "m/s a row")
     for channel, name in enumerate(COLUMNS[record.kind]):
-        rounding = ROUNDING * _largest([data[channel]])  # of sums and products: counts that are alike may differ by it
-        values = rounding * np.round(data[channel] / rounding) if rounding else data[channel]
-        noise = float(np.median(np.abs(np.diff(values, n=2)))) / (0.6745 * math.sqrt(6.0)) if len(values) > 2 else 0.0
-        for sign in (1.0, -1.0):
-            signed = sign * values
-            top = float(signed.max())
-            at_top = signed == top
-            count = int(np.count_nonzero(at_top))
-            if count < 2 * SATURATED_RUN or count == values.size:
-                continue
-            levels, counts = np.unique(signed[~at_top], return_counts=True)
-            spread = top - float(np.median(signed))
-            tail = counts[levels > top - TAIL * spread]
-            cut = len(tail) > TAIL_LEVELS and count > limit("piled") * max(
-                int(tail.max()), 2
-            )  # of many levels, each with few rows
-            off = _off(top, levels[1:])  # what clips may have two sides
-            two_sided = -float(levels[0]) <= RANGE_SLACK * abs(top)
-            if not (cut or off or two_sided):  # a range has two sides alike: not its end
-                continue
-            second = float(levels[-1])
-            inside = int(counts[levels >= second - (PERIOD - 0.5) * _finest(levels)].max())
-            rows_at = np.flatnonzero(at_top)
-            consecutive = bool(np.any(rows_at[SATURATED_RUN - 1 :] - rows_at[: 1 - SATURATED_RUN] == SATURATED_RUN - 1))
-            # Noise of less than a quantum takes a row one further down; half a quantum is for rounding.
-            lowest = second - (1.5 if noise <= top - second else 0.5) * (top - second)
-            crests = _crests(signed, rows_at, lowest, inside)
-            if (
-                not off
-                and noise <= top - second
-                and inside > limit("piled") * max(int(counts[-4:-1].max(initial=0)), 2)
-            ):
-                continue  # steady between two counts: what clips does not stand at the second as well
-            often = count > limit("piled") * max(inside, 2)
-            piled = count > 2 * inside and (consecutive or often) and not crests
-            # Values that have many digits are never alike by chance, wherever the next ones stand.
-            piled = piled and (
-                spread > 5.0 * (top - second) or (often and top - second > limit("piled") * _finest(levels))
-            )
-            if piled or off:
-                rows[channel] += count
-                findings.append(
-                    Finding(
-                        "error",
-                        "saturated",
-                        f"{name} stands at its extreme {sign * top:.4g} {unit[channel // 3]} in {count} rows (the "
-                        f"next value inside in {inside}); expected a tail that thins out: the sensor's range is "
-                        "exceeded; use a sensor of larger range or leave this stretch out",
-                    )
+        for extreme in clipped_at(data[channel]):
+            rows[channel] += extreme.rows
+            findings.append(
+                Finding(
+                    "error",
+                    "saturated",
+                    f"{name} stands at its extreme {extreme.value:.4g} {unit[channel // 3]} in {extreme.rows} rows (the "
+                    f"next value inside in {extreme.inside}); expected a tail that thins out: the sensor's range is "
+                    "exceeded; use a sensor of larger range or leave this stretch out",
                 )
+            )
     return rows
-
-
-def _off(top: float, levels: Array) -> bool:
-    """Whether all values but the extreme are multiples of one step: something behind the sensor has clipped it."""
-    if len(levels) < FEWEST_LEVELS:
-        return False
-    step = _finest(levels)
-    places = (levels - levels[0]) / step
-    if np.abs(places - np.round(places)).max() > LATTICE:
-        return False
-    place = (top - levels[0]) / step
-    return bool(abs(place - round(place)) > OFF)
-
-
-def _crests(signed: Array, rows_at: NDArray[np.intp], lowest: float, inside: int) -> bool:
-    """Whether the rows at the largest value are crests of a smooth motion, seen through a coarse quantum.
-
-    Around a crest ``x = x_0 - a t^2 / 2`` the uppermost quantum has up to ``1 / (sqrt(2) - 1)`` times as many rows as the next,
-    each side of either to a row; and the rows before and after are of the next one, `lowest` at least. What is clipped falls
-    from its range faster.
-    """
-    breaks = np.flatnonzero(np.diff(rows_at) > 1)
-    first, last = rows_at[np.append(0, breaks + 1)], rows_at[np.append(breaks, len(rows_at) - 1)]
-    before, after = signed[np.maximum(first - 1, 0)], signed[np.minimum(last + 1, len(signed) - 1)]
-    smooth = bool(np.all(before >= lowest) and np.all(after >= lowest))
-    return smooth and len(rows_at) <= (inside + 2 * len(first)) / (math.sqrt(2.0) - 1.0) + len(first)
-
-
-def _finest(values: Array) -> float:
-    """The smallest step between two values, but for rounding of the arithmetic; infinite where all are alike."""
-    steps = np.diff(np.unique(values))
-    rounding = ROUNDING * float(np.abs(values).max(initial=0.0))
-    return float(np.min(steps, initial=np.inf, where=steps > rounding))
