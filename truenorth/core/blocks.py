@@ -33,3 +33,14 @@ def means_of(cells: Array) -> Array:
     for row in range(1, m):
         total += cells[..., row, :]
     return np.asarray(total / m)
+
+
+def levels_of(x: Array) -> tuple[Array, NDArray[np.int64]]:
+    """The levels of a channel (N,), rising, and the rows of each: as `numpy.unique`, in less memory where they are few."""
+    if len(x) <= BLOCK:
+        return np.unique(x, return_counts=True)
+    parts = [np.unique(x[rows], return_counts=True) for rows in row_blocks(len(x))]
+    levels, which = np.unique(np.concatenate([part[0] for part in parts]), return_inverse=True)
+    counts = np.zeros(len(levels), dtype=np.int64)
+    np.add.at(counts, which, np.concatenate([part[1] for part in parts]))
+    return levels, counts

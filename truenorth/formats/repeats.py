@@ -32,8 +32,9 @@ def without_repeats(
     rows = len(gyro)
     if not choice.time or rows < FEWEST:
         return columns, None
-    same = np.all(gyro[1:] == gyro[:-1], axis=1)
-    same &= np.all(accel[1:] == accel[:-1], axis=1)
+    same = np.ones(rows - 1, dtype=bool)
+    for values in (*gyro.T, *accel.T):  # one after the other: of a long log all at once are much memory
+        same &= values[1:] == values[:-1]
     if not same.any():
         return columns, None
     at_once = np.ones(rows - 1, dtype=bool)

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.blocks import row_blocks
+from truenorth.core.blocks import levels_of, row_blocks
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
 from truenorth.quality.other_counts import counts_in_turn, has_many_levels
@@ -229,5 +229,5 @@ def _step(values: Array) -> float:
     rounding = ROUNDING * float(np.abs(values).max())
     if has_many_levels(values, 0.25):
         return rounding
-    levels = np.unique(values)
+    levels, _ = levels_of(values)
     return float(np.diff(levels).min()) if 1 < len(levels) < len(values) // 4 else rounding

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.blocks import row_blocks
+from truenorth.core.blocks import levels_of, row_blocks
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -55,7 +55,8 @@ def _piled(signed: Array, noise: float) -> Extreme | None:
     count = int(np.count_nonzero(at_top))
     if count < 2 * RUN or count == signed.size:
         return None
-    levels, counts = np.unique(signed[~at_top], return_counts=True)
+    levels, counts = levels_of(signed)
+    levels, counts = levels[:-1], counts[:-1]  # inside
     spread = top - float(np.median(signed))
     tail = counts[levels > top - TAIL * spread]
     most = limit("piled")
@@ -113,7 +114,7 @@ def finest(values: Array) -> float:
     return float(np.min(steps, initial=np.inf, where=steps > rounding))
 
 
-def largest(sensor: Sequence[Array]) -> float:
+def largest(sensor: Iterable[Array]) -> float:
     """The largest size of any value of some channels."""
     return max(max(float(x.max()), -float(x.min())) for x in sensor)
 

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import levels_of
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure
@@ -48,7 +49,7 @@ def piled_up(values: Array) -> Pile | None:
     ordered = np.sort(values)
     if not np.any(ordered[least - 1 :] == ordered[: len(ordered) - least + 1]):
         return None  # no value has so many rows
-    levels, counts = np.unique(ordered, return_counts=True)
+    levels, counts = levels_of(ordered)
     if len(levels) < 2 * LEVELS + 1:
         return None
     before = np.append(0, np.cumsum(counts))  # rows below each level

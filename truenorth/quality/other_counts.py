@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import levels_of
 from truenorth.quality.quantum import lattice
 from truenorth.records import ImuRecord
 
@@ -35,7 +36,7 @@ def _in_turn(values: Array, period: int) -> bool:
     for k, own in enumerate(turns):
         if has_many_levels(own, LEVELS):
             continue
-        levels = np.unique(own)
+        levels, _ = levels_of(own)
         if not FEWEST <= len(levels) <= LEVELS * len(own):
             continue
         step, _ = lattice(own)

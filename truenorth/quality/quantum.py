@@ -16,6 +16,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import levels_of
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure
@@ -81,16 +82,26 @@ def lattice(values: Array) -> tuple[float, Array]:
 
     Zero, and no values, where they are not.
     """
-    levels, counts = np.unique(values, return_counts=True)
+    step, fullest = _step_and_fullest(values)
+    return step, np.round((values - fullest) / step) if step else np.zeros(0)
+
+
+def lattice_step(values: Array) -> float:
+    """The step of which a channel's values (N,) are multiples, zero where they are not."""
+    return _step_and_fullest(values)[0]
+
+
+def _step_and_fullest(values: Array) -> tuple[float, float]:
+    levels, counts = levels_of(values)
     if len(levels) < 2:
-        return 0.0, np.zeros(0)
-    apart, fullest = np.diff(levels), levels[np.argmax(counts)]
+        return 0.0, 0.0
+    apart, fullest = np.diff(levels), float(levels[np.argmax(counts)])
     step = float(np.min(apart[apart > SAME * np.ptp(levels)]))
     off = (levels - fullest) / step
     place = np.round(off)
     if np.any(np.abs(off - place) > LATTICE * np.maximum(np.abs(place), 1.0)):
-        return 0.0, np.zeros(0)
-    return step, np.round((values - fullest) / step)
+        return 0.0, 0.0
+    return step, fullest
 
 
 def largest_step(values: Array) -> float:

@@ -16,8 +16,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import row_blocks
 from truenorth.core.earth import GRAVITY_EQUATOR
-from truenorth.quality.quantum import largest_step, lattice
+from truenorth.quality.clipped import largest
+from truenorth.quality.quantum import largest_step, lattice_step
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.limits import limit
@@ -32,15 +34,18 @@ STANDARD_GRAVITY = 9.80665  # m/s^2
 WHOLE = 1e-3  # of a count, by which values may miss multiples of the step
 
 
-def counts_of(sensor: Array) -> Array | None:
-    """Counts (N, 3) of a sensor whose channels have one step, counted from nothing; None where they have no such step."""
-    steps = [lattice(x)[0] for x in sensor.T]
-    step = min((x for x in steps if x > 0.0), default=0.0)
-    if step == 0.0:
-        return None
-    counts = sensor / step
-    whole = np.round(counts)
-    return whole if float(np.max(np.abs(counts - whole) / np.maximum(np.abs(whole) * 1e-6, 1.0))) < WHOLE else None
+def _step_of(sensor: Array) -> float:
+    """The step of the channels of a sensor; zero where they have none."""
+    return min((step for step in (lattice_step(x) for x in sensor.T) if step > 0.0), default=0.0)
+
+
+def counts_of(x: Array, step: float) -> Array | None:
+    """Counts (N,) of a channel, counted from nothing; None where its values are no multiples of the step."""
+    off = x / step
+    whole = np.round(off)
+    off -= whole
+    sound = (np.all(np.abs(off[k]) < WHOLE * np.maximum(np.abs(whole[k]) * 1e-6, 1.0)) for k in row_blocks(len(x)))
+    return whole if all(sound) else None
 
 
 def _is_text(step: float) -> bool:
@@ -52,18 +57,26 @@ def _is_text(step: float) -> bool:
 def rolled_over_evidence(record: ImuRecord) -> list[Evidence]:
     """That gravity stands at the end of a counter of the accelerometers."""
     unit = 1.0 / record.interval if record.kind == "increments" else 1.0
-    force = np.median(record.accel, axis=0)
+    channels = record.accel.T  # one after the other: of a long log all three at once are much memory
+    force = [float(np.median(x)) for x in channels]
     channel = int(np.argmax(np.abs(force)))
-    if abs(unit * float(force[channel])) < (1.0 - limit("gravity")) * GRAVITY_EQUATOR:
+    if abs(unit * force[channel]) < (1.0 - limit("gravity")) * GRAVITY_EQUATOR:
         return []
-    if np.max(np.abs(record.accel)) > 2.0 ** max(BITS) * max(largest_step(x) for x in record.accel.T):
+    if largest(channels) > 2.0 ** max(BITS) * max(largest_step(x) for x in channels):
         return []  # steps so small are of no such counter
-    counts = counts_of(record.accel)
-    if counts is None or _is_text(float(np.max(np.abs(record.accel)) / np.max(np.abs(counts)))):
+    step = _step_of(record.accel)
+    if step == 0.0:
         return []
-    largest, middle = float(np.abs(counts).max()), abs(float(np.median(counts[:, channel])))
+    most, middle = 0.0, 0.0
+    for k, x in enumerate(channels):
+        if (counts := counts_of(x, step)) is None:
+            return []
+        most = max(most, largest([counts]))
+        middle = abs(float(np.median(counts))) if k == channel else middle
+    if _is_text(largest(channels) / most):
+        return []
     for half in (2.0 ** (bits - 1) for bits in BITS):
-        if largest <= half and middle > (1.0 - limit("gravity")) * half:
+        if most <= half and middle > (1.0 - limit("gravity")) * half:
             name = COLUMNS[record.kind][3 + channel]
             return [note("record.rolls_over", urgent=True, name=name, count=middle, range=half)]
     return []
