@@ -1,7 +1,8 @@
-"""A log of days on a machine with little memory: `align` and `navigate` of 48 h at 200 Hz, each allowed 2 GiB of its own.
+"""Logs of days on a machine with little memory: `align` and `navigate` of 48 h at 200 Hz, each allowed 2 GiB of its own.
 
-The logs are made on the disk, at rest, in pieces: one of the last digit, one of counts, as laser gyros have them. Printed are processor time, and the most memory that is a command's own and that is
-the mapped file's. Run: ``python -m benchmarks days`` (Linux; 2 GiB of disk twice, minutes).
+The logs are made on the disk, at rest, in pieces: one of noise to the last digit, one of counts, as laser gyros have them. Printed
+are processor time, and the most memory that is a command's own and that is the mapped file's. Run: ``python -m benchmarks days``
+(Linux; 2 GiB of disk twice, minutes).
 """
 
 from __future__ import annotations
