@@ -24,7 +24,8 @@ from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
-from truenorth.navigation.departure import UNSEEN_GAIN, Departure, departure
+from truenorth.navigation.departure import SHORTEST, UNSEEN_GAIN, Departure, departure
+from truenorth.navigation.first_heading import turn_since_first_row
 from truenorth.navigation.start import moving_start, start_from_alignment
 from truenorth.quality.held import as_sampled
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
@@ -186,6 +187,7 @@ def known_start(
         At the start.
     imu : ImuSpec, str, path or mapping
     heading, sigma : float, rad
+        Where the record begins.
     pitch, roll : float, rad, optional
         Both or none. Left out, the level is that of the log, whose beginning the vehicle then spends at rest or swaying.
     level_sigma : float, rad
@@ -211,7 +213,8 @@ def known_start(
         raise UsageError("pitch or roll is given alone; expected both, or none: the level then comes from the log")
     if pitch is None or roll is None:
         answer, departs = _levelled(log, at, spec)
-        start = start_from_alignment(with_heading(answer, heading, sigma))
+        turned, unsure = turn_since_first_row(log, answer)
+        start = start_from_alignment(with_heading(answer, heading + turned, math.hypot(sigma, unsure)))
         return start if departs is None else _may_have_left(start, departs.unseen)
     if not (sigma > 0.0 and level_sigma > 0.0 and velocity_sigma > 0.0):
         raise UsageError(f"sigmas {sigma:g}, {level_sigma:g} rad, {velocity_sigma:g} m/s; expected all above zero")
@@ -324,9 +327,12 @@ def _levelled(record: ImuRecord, place: Position, spec: ImuSpec) -> tuple[Alignm
         answer = align(start, place, spec)
         if answer.status in ("aligned", "level_only"):
             return answer, None
-    first = max(1.0, end + SEEN_LATE - begin)
+    # Where a departure begins within its shortest span is not known better.
+    first, needed = (
+        (SHORTEST,) * 2 if seen is not None else (max(1.0, end + SEEN_LATE - begin), SHORTEST_LEVEL + SEEN_LATE)
+    )
     raise AlignmentError(
-        f"{record.source}: the vehicle moves within the first {first:.0f} s; {SHORTEST_LEVEL + SEEN_LATE:g} s at rest are needed, "
+        f"{record.source}: the vehicle moves within the first {first:.0f} s; {needed:g} s at rest are needed, "
         "or a minute in which it only sways: give pitch and roll"
     )
 
