@@ -62,6 +62,27 @@ def test_a_second_is_a_stop_where_all_that_look_agree(standing):
     assert not np.any((found > 102.0) & (found < 198.0))
 
 
+@pytest.mark.parametrize("speed", [0.02, 0.06, 0.15])
+def test_a_machine_that_creeps_does_not_stand(standing, speed):
+    """A paver goes at 6 cm/s, as smooth as at rest; a wheel to half a centimetre a second, or of pulses of 2 mm, sees it."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.1, 300.0, 0.1)
+    goes = np.where((time > 100.0) & (time < 200.0), speed, 0.0)
+    way = np.floor(np.cumsum(goes * 0.1) / 0.002)
+    for log in (
+        OdometerRecord(time, goes + 0.005 * rng.standard_normal(len(time)), "speed"),
+        OdometerRecord(time, np.diff(way, prepend=0.0), "pulses", 0.002),
+    ):
+        found = seconds_at_rest(standing, odometer=log)[0]
+        assert len(found) > 185
+        assert not np.any((found > 101.0) & (found < 199.0))
+
+
+def test_a_wheel_that_is_noisy_stands_as_before(standing):
+    log = OdometerRecord(T, 0.05 * np.random.default_rng(5).standard_normal(len(T)), "speed")
+    assert len(seconds_at_rest(standing, odometer=log)[0]) > 285
+
+
 def test_a_vehicle_that_hovers_is_at_rest_as_well_as_its_log_says():
     """Taken for +-.03 m/s, swaying by .1, its zero velocities were "rejected: they contradict the track"."""
     rng = np.random.default_rng(6)
