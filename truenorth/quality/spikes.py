@@ -106,8 +106,9 @@ def spikes_of(values: Array, interval: float, far: float = FAR, sizes: Sizes | N
     said, size, usual = sizes
     at = np.flatnonzero((size > far * usual) & (usual > 0.0))
     at = at[(at > 0) & (at < len(size) - 1)]
-    around = (at[:, None] + np.arange(-HALF, HALF + 1)) % len(size)
-    at = HALF + at[size[at] >= size[around].max(axis=1)]
+    for lag in (*range(-HALF, 0), *range(1, HALF + 1)):  # one after the other: of a counter most rows may stand out
+        at = at[size[at] >= size[(at + lag) % len(size)]]
+    at = HALF + at
     near, far_off = (
         0.5 * sum(values[at + lag] - values[at - lag] for lag in lags) for lags in ((1, 2), (HALF, HALF + 1))
     )
