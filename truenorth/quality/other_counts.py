@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.blocks import levels_of
-from truenorth.quality.quantum import lattice
+from truenorth.quality.quantum import lattice_step
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def _in_turn(values: Array, period: int) -> bool:
         levels, _ = levels_of(own)
         if not FEWEST <= len(levels) <= LEVELS * len(own):
             continue
-        step, _ = lattice(own)
+        step = lattice_step(own)
         if step == 0.0 or len(levels) < FILLED * (np.ptp(levels) / step + 1.0):
             continue
         others = (turns[j] for j in range(period) if j != k)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.quality.knocks import sums_of_answer
-from truenorth.quality.quantum import largest_step, lattice
+from truenorth.quality.quantum import largest_step, lattice_step
 from truenorth.records import COLUMNS, ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -163,7 +163,7 @@ def one_sided(values: Array, interval: float) -> OneSided | None:
             continue
         alone = np.abs(values[at] - said)
         bound = largest_step(values)
-        alone = alone > far * (bound if far * bound < alone.min() else lattice(values)[0])
+        alone = alone > far * (bound if far * bound < alone.min() else lattice_step(values))
         at, said = at[alone], said[alone]
         size = values[at] - said
         total = float(size.sum())
