@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import row_blocks
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.quality.knocks import sums_of_answer
 from truenorth.quality.quantum import largest_step, lattice_step
@@ -67,9 +68,17 @@ class Spikes(NamedTuple):
 class Sizes(NamedTuple):
     """Of a channel: by how much its rows, but for three at either end, miss what their neighbours say."""
 
-    said: Array
     size: Array
-    usual: Array  # one sigma of that, about each row
+    usual: Array  # one sigma of that, in each stretch
+    stretch: int  # rows
+
+    def beyond(self, far: float) -> Rows:
+        """Which are more than so many sigmas."""
+        found = [np.empty(0, dtype=np.intp)]
+        for rows in row_blocks(len(self.size)):
+            usual = self.usual[np.minimum(np.arange(rows.start, rows.stop) // self.stretch, len(self.usual) - 1)]
+            found.append(rows.start + np.flatnonzero((self.size[rows] > far * usual) & (usual > 0.0)))
+        return np.concatenate(found)
 
 
 def sizes_of(values: Array, interval: float) -> Sizes | None:
@@ -77,13 +86,18 @@ def sizes_of(values: Array, interval: float) -> Sizes | None:
     rows = max(round(STRETCH / interval), 2 * HALF + 1)
     if len(values) < rows:
         return None
-    said = np.convolve(values, NEIGHBOURS, mode="valid")
-    size = np.abs(values[HALF:-HALF] - said)
-    usual, last = np.empty(len(size)), _last_stretch(len(size), rows)
-    if last:
-        usual[:last] = np.repeat(np.median(size[:last].reshape(-1, rows), axis=1) / MEDIAN, rows)
-    usual[last:] = np.median(size[last:]) / MEDIAN
-    return Sizes(said, size, usual)
+    size = np.empty(len(values) - 2 * HALF)
+    for part in row_blocks(len(size)):
+        size[part] = np.abs(_missed(values[part.start : part.stop + 2 * HALF]))
+    last = _last_stretch(len(size), rows)
+    stretches = [np.median(size[part].reshape(-1, rows), axis=1) for part in row_blocks(last, rows)]
+    usual = np.concatenate([*stretches, [np.median(size[last:])]]) / MEDIAN
+    return Sizes(size, usual, rows)
+
+
+def _missed(values: Array) -> Array:
+    """By what values miss what their neighbours say, but for those at either end."""
+    return np.asarray(values[HALF:-HALF] - np.convolve(values, NEIGHBOURS, mode="valid"))
 
 
 def spikes_of(values: Array, interval: float, far: float = FAR, sizes: Sizes | None = None) -> Spikes:
@@ -103,8 +117,7 @@ def spikes_of(values: Array, interval: float, far: float = FAR, sizes: Sizes | N
         sizes = sizes_of(values, interval)
     if sizes is None:
         return none
-    said, size, usual = sizes
-    at = np.flatnonzero((size > far * usual) & (usual > 0.0))
+    size, at = sizes.size, sizes.beyond(far)
     at = at[(at > 0) & (at < len(size) - 1)]
     for lag in (*range(-HALF, 0), *range(1, HALF + 1)):  # one after the other: of a counter most rows may stand out
         at = at[size[at] >= size[(at + lag) % len(size)]]
@@ -115,7 +128,11 @@ def spikes_of(values: Array, interval: float, far: float = FAR, sizes: Sizes | N
     # Of means 3 and 7 rows from each other, in which a slope has 3 and 7 times.
     step = (7.0 * near - 3.0 * far_off) / 4.0
     at = at[np.abs(step) < SAME * size[at - HALF]]
-    return none if len(at) > MOST * len(values) else Spikes(at, said[at - HALF])
+    if len(at) > MOST * len(values):
+        return none
+    return Spikes(
+        at, np.asarray(sum(w * values[at + k] for k, w in zip(range(-HALF, HALF + 1), NEIGHBOURS, strict=True)))
+    )
 
 
 def _last_stretch(count: int, rows: int) -> int:
@@ -191,8 +208,7 @@ def _kind(values: Array, at: Rows, said: Array, interval: float) -> Kind | None:
 
 def _of_noise(values: Array) -> float:
     """One sigma of what white noise adds to the sum of all rows."""
-    off = values[HALF:-HALF] - np.convolve(values, NEIGHBOURS, mode="valid")
-    white = float(np.median(np.abs(off))) / MEDIAN / math.sqrt(1.0 + float(NEIGHBOURS @ NEIGHBOURS))
+    white = float(np.median(np.abs(_missed(values)))) / MEDIAN / math.sqrt(1.0 + float(NEIGHBOURS @ NEIGHBOURS))
     return white * math.sqrt(len(values))
 
 
