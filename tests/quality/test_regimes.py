@@ -244,3 +244,20 @@ def test_earth_rate_gives_the_latitude():
     record, position = recordings.rlg_vehicle_xian()
     assert "earth_rate" in codes(inspect(record, position.lat), "note")
     assert "latitude" in codes(inspect(record, -position.lat), "warning")  # the wrong hemisphere
+
+
+@pytest.mark.parametrize("length", [3.2, 60.0])
+def test_in_a_gap_nothing_rests(length):
+    """Between two rows a straight line shows no motion: of a phone in the hand 85 s without a row were its longest rest."""
+    time = 0.01 * np.arange(1, 12001)
+    rng = np.random.default_rng(7)
+    gyro = 0.5 * np.sin(2.0 * np.pi * time[:, None] / np.array([3.0, 4.0, 5.0])) + 1e-3 * rng.standard_normal(
+        (12000, 3)
+    )
+    accel = np.array([0.0, 0.0, 9.8]) + 0.01 * rng.standard_normal((12000, 3))
+    keep = (time < 40.0) | (time > 40.0 + length)
+    cut = ImuRecord(time[keep], gyro[keep], accel[keep], "rates")
+    assert "still" not in {stretch.kind for stretch in motion_summary(cut).regimes}
+    found = inspect(cut)
+    assert found.noise_from is None
+    assert codes(found) >= {"gaps", "no_rest"}

@@ -197,7 +197,8 @@ class MotionSummary:
 def motion_summary(record: ImuRecord) -> MotionSummary:
     """Tell the kinds of motion of a record apart.
 
-    Gaps are bridged by interpolation; a second inside a gap takes the kind of its neighbours.
+    Gaps are bridged by interpolation; a second inside a gap takes the stronger kind of its neighbours: a straight line would
+    show rest where nothing was seen.
 
     Parameters
     ----------
@@ -241,7 +242,17 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
         rate_noise=length_of(angle_noise),
     )
     time = record.time[0] - record.interval + per_second * interval * np.arange(1, seconds + 1)
+    _as_around_gaps(kind, time, record)
     return MotionSummary(time, kind, rate.T, force.T, motion, around, bias, angle_noise, _stretches(time, kind, record))
+
+
+def _as_around_gaps(kind: NDArray[np.int8], time: Array, record: ImuRecord) -> None:
+    """Give seconds (m,) that end at these times, and of which a gap leaves no row, the stronger kind of those around it."""
+    for k in record.gaps:
+        # The first of them begins at or after the last row, the last one ends before the row behind the gap.
+        first, behind = (int(np.searchsorted(time, record.time[i])) for i in (k - 1, k))
+        if first + 1 < behind:
+            kind[first + 1 : behind] = kind[first : behind + 1 : behind - first].max()
 
 
 def _near(surely: NDArray[np.bool_], maybe: NDArray[np.bool_]) -> NDArray[np.bool_]:
