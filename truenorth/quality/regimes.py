@@ -45,6 +45,12 @@ STILL, DISTURBED, SWAYING, ROTATING, MOVING = range(5)
 TURN_WINDOW = 21  # s, odd; a sway cancels in it, a turn does not
 NOISE_FACTOR = 4.0  # wander beyond this many times the noise's: below 1e-6 a window by chance
 QUIETEST = 3.0  # times the wander of the quietest window: white noise has more in one of a million windows
+LOUD_GYRO = (
+    np.radians(10.0) / 60.0
+)  # rad/sqrt(s): ten times a consumer gyro's; no MEMS at rest is louder, sampled slowly or not ...
+LOUD_FORCE = (
+    0.03  # m/s^2/sqrt(Hz), of three axes: ... where the accelerometers are ten times as loud as a consumer's, too
+)
 ONE_VALUE = 1e-9  # rad: wander of a window of equal rows, up to rounding
 SWAY_ANGLE = np.radians(1.0)  # amplitude from which an oscillation is called swaying
 TURN_RATE = np.radians(0.5)  # rad/s
@@ -111,7 +117,7 @@ class MotionSummary:
         What was taken out (sensor bias and earth rate).
     angle_noise : (3,) array, rad/sqrt(s)
         Angle random walk of the quiet quarter of the record, or of its quietest 10 s where that is less; vibration above 2 Hz
-        counts as noise.
+        counts as noise. No more than gyros have where the accelerometers are too loud for rest as well.
     regimes : tuple of Regime
         Stretches in order, without holes.
     """
@@ -216,7 +222,7 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
 
     noise = white_noise(record)
     wander = angle_wander(rates[:3], interval, per_second)  # (3, windows), of each window of up to 10 s
-    angle_noise, force_noise = _no_motion(noise[:3], wander, seconds), noise[3:]
+    angle_noise, force_noise = _no_motion(noise, wander, seconds), noise[3:]
     bias = rate_bias(rates[:3], wander, per_second, angle_noise)
     force = second_means(rates[3:], per_second)
     still_gravity = bias_by_gravity(second_means(rates[:3], per_second), force)
@@ -265,14 +271,16 @@ def _walk(seconds: int) -> float:
     return float(np.sqrt(min(WINDOW, seconds) / 15.0))
 
 
-def _no_motion(angle_noise: Array, wander: Array, seconds: int) -> Array:
-    """(3,) white noise that leaves a window as quiet as the quietest one.
+def _no_motion(noise: Array, wander: Array, seconds: int) -> Array:
+    """(3,) white noise of the gyros, of that of all sensors (6,), that leaves a window as quiet as the quietest one.
 
     The quiet quarter of a log that rests less than a quarter is in motion, and rough ground or steps look white. A sensor's noise
-    is there at rest, too. An axis that stands on one value for a window is coarse, or stuck, and shows no noise.
+    is there at rest, too. An axis that stands on one value for a window is coarse, or stuck, and shows no noise. And where a log
+    never rests, as of a walk at 10 Hz, its gyros and accelerometers are louder than any: no more than a gyro's is noise.
     """
-    quietest = wander.min(axis=1)
-    return np.where(quietest > ONE_VALUE, np.minimum(angle_noise, QUIETEST * quietest / _walk(seconds)), angle_noise)
+    quietest, gyro = wander.min(axis=1), noise[:3]
+    found = np.where(quietest > ONE_VALUE, np.minimum(gyro, QUIETEST * quietest / _walk(seconds)), gyro)
+    return np.minimum(found, LOUD_GYRO) if length_of(noise[3:]) > LOUD_FORCE else found
 
 
 def _unknown(record: ImuRecord) -> MotionSummary:
