@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+from dataclasses import fields, is_dataclass
 
 import pytest
 
@@ -104,6 +106,15 @@ def test_what_a_person_sees_is_what_is_public():
     code = "import truenorth as tn, sys; before = set(sys.modules); tn.filters.kalman; tn.analysis.nees; tn.errors"
     seen = "print('truenorth.filters' in before, 'truenorth.filters' in sys.modules)"
     assert run(f"{code}; {seen}").split() == ["False", "True"]
+
+
+def test_the_record_of_each_public_aid_is_public():
+    """Who has arrays and no file could make no `Indexer`: its record was not."""
+    import truenorth
+
+    aids = [thing for name in truenorth.__all__ if is_dataclass(thing := getattr(truenorth, name))]
+    wanted = {word for aid in aids for x in fields(aid) for word in re.findall(r"\w+Record|Trajectory", str(x.type))}
+    assert {"EncoderRecord", "GnssRecord", "MasterRecord"} <= wanted <= set(truenorth.__all__)
 
 
 def test_python_ends_without_looking_for_garbage():

@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from truenorth.papers import reproduce
     from truenorth.quality import inspect
     from truenorth.records import (
+        EncoderRecord,
         GnssRecord,
         HeightRecord,
         ImuRecord,
@@ -110,6 +111,7 @@ _HOMES = {
     "Calibration": "records.calibration",
     "DataError": "core.errors",
     "Deflection": "errors.deflection",
+    "EncoderRecord": "records",
     "Fixes": "aiding.fixes",
     "Gnss": "aiding.aids",
     "GnssRecord": "records",
@@ -178,6 +180,7 @@ __all__ = [
     "Calibration",
     "DataError",
     "Deflection",
+    "EncoderRecord",
     "Fixes",
     "Gnss",
     "GnssRecord",

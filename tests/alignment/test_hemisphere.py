@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from tests.alignment.test_bias_step import PLACE, ship
-from truenorth.alignment import align, rotary
-from truenorth.alignment.hemisphere import hemisphere_evidence
+from truenorth.alignment import align, rotary, signatures
+from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
+from truenorth.alignment.matched import innovations_of, whitened
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.position import Position
+from truenorth.filters.gains import through
+from truenorth.simulation import rest, simulate
 from truenorth.state.limits import limit
 
 
@@ -35,6 +38,27 @@ def test_aligning_anew_is_asked_where_the_bend_can_be_seen():
         match = SimpleNamespace(ratio=[ratio], size=[size])
         found = hemisphere_evidence(match, fine, place, lambda where: 85.0 * (where.lat > 0.0))
         assert [item.key for item in found] == ["place.hemisphere"] * asked
+
+
+@pytest.mark.parametrize("lat", [5.0, -30.0])
+def test_of_hours_at_rest_the_bend_is_what_the_innovations_hold_of_it(lat, monkeypatch):
+    """Gravity bends by 1.8 km/s at 5 deg in 3 h, of which the filter leaves .7 sigmas; a sum lost them, and the size was 2e298."""
+    place, kept = Position.from_degrees(lat, 10.0), []
+    of = signatures.hemisphere_evidence
+
+    def keep(match, fine, *rest, **more):
+        kept.append((match, fine))
+        return of(match, fine, *rest, **more)
+
+    monkeypatch.setattr(signatures, "hemisphere_evidence", keep)
+    log = simulate(rest(place, heading=1.0), rate=2.0, duration=3 * 3600.0, imu="tactical", seed=70317).record
+    assert "other hemisphere" not in str(align(log, place, "tactical").reasons)
+    (match, fine), *_ = kept
+    seen = innovations_of(fine)
+    made = whitened(seen.L, through(fine.gains, hemisphere_signature(fine, place).measured_course)[0])[..., 0]
+    energy, agree = np.sum(made**2), np.sum(made * seen.white[..., 0])
+    np.testing.assert_allclose([match.ratio[0], match.size[0]], [agree**2 / energy, agree / energy], rtol=1e-6)
+    assert abs(match.size[0]) < 5.0 / np.sqrt(energy)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import matched as module
-from truenorth.alignment.matched import Innovations, Signatures, innovations_of, matched
+from truenorth.alignment.matched import Innovations, Signatures, innovations_of, matched, matched_whole
 from truenorth.alignment.summed_back import AT_REST
 from truenorth.errors.staying import PHI
 from truenorth.filters import LinearSystem, filter_gains, kalman
@@ -67,6 +67,27 @@ def test_as_forward(other, W):
         energy, match = y @ information @ y, y @ information @ white
         np.testing.assert_allclose([ratio[s], size[s]], [match**2 / energy, match / energy], rtol=1e-10)
         np.testing.assert_allclose(left[:, s], e[PHI], rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("other", [0, 2])
+def test_what_begins_with_the_log_followed_forward(other):
+    """The same figures as of the sums; and of a course that a state takes up but for one part in 1e5."""
+    rng = np.random.default_rng(8)
+    Phi, H = np.tile(np.eye(N), (K, 1, 1)), np.tile(np.eye(M, N), (K, 1, 1))
+    Q, R = np.zeros((K, N, N)), np.tile(np.eye(M), (K, 1, 1))
+    system = LinearSystem(Phi, Q, H, R, rng.standard_normal((K, M)), np.zeros(N), 1e14 * np.eye(N))
+    estimates = kalman(system, history="full")
+    fine = SimpleNamespace(system=system, estimates=estimates, gains=filter_gains(system, estimates))
+    seen = innovations_of(fine, 1e-3 * rng.standard_normal((K, M, other)) if other else None)
+    course = rng.standard_normal((K, M, 1))
+    none, one = np.zeros((N, 1)), np.ones((1, 1))
+    bank = Signatures(np.zeros(1, dtype=np.int64), none, course[0], one, none, course)
+    whole = matched_whole(seen, bank)
+    for together, alone in zip(matched(seen, bank)[0], whole, strict=True):
+        np.testing.assert_allclose(together, alone, rtol=1e-5, atol=1e-9)
+    apart = course + 1e5  # a constant is a state
+    large = matched_whole(seen, bank._replace(measured=apart[0], measured_course=apart))
+    np.testing.assert_allclose([large.ratio, large.size], [whole.ratio, whole.size], rtol=1e-3)
 
 
 def test_sizes_written_in_the_kernel_change_no_bit(monkeypatch):

@@ -244,3 +244,34 @@ def test_earth_rate_gives_the_latitude():
     record, position = recordings.rlg_vehicle_xian()
     assert "earth_rate" in codes(inspect(record, position.lat), "note")
     assert "latitude" in codes(inspect(record, -position.lat), "warning")  # the wrong hemisphere
+
+
+@pytest.mark.parametrize("length", [3.2, 60.0])
+def test_in_a_gap_nothing_rests(length):
+    """Between two rows a straight line shows no motion: of a phone in the hand 85 s without a row were its longest rest."""
+    time = 0.01 * np.arange(1, 12001)
+    rng = np.random.default_rng(7)
+    gyro = 0.5 * np.sin(2.0 * np.pi * time[:, None] / np.array([3.0, 4.0, 5.0])) + 1e-3 * rng.standard_normal(
+        (12000, 3)
+    )
+    accel = np.array([0.0, 0.0, 9.8]) + 0.01 * rng.standard_normal((12000, 3))
+    keep = (time < 40.0) | (time > 40.0 + length)
+    cut = ImuRecord(time[keep], gyro[keep], accel[keep], "rates")
+    assert "still" not in {stretch.kind for stretch in motion_summary(cut).regimes}
+    found = inspect(cut)
+    assert found.noise_from is None
+    assert codes(found) >= {"gaps", "no_rest"}
+
+
+@pytest.mark.parametrize(
+    ("gyro", "accel", "stays"), [(130.0, 0.2, False), (130.0, 0.002, True), (3.0, 0.2, True), (3.0, 0.002, True)]
+)
+def test_no_sensors_at_rest_are_as_loud_as_a_walk(gyro, accel, stays):
+    """At 10 Hz the steps of one who walks look white, in deg/sqrt(h) and m/s^2/sqrt(Hz): it was rest, and its noise was given."""
+    time, rng = 0.1 * np.arange(1, 3001), np.random.default_rng(12)
+    rates = np.radians(gyro) / 60.0 / np.sqrt(0.1) * rng.standard_normal((3000, 3))
+    forces = np.array([0.0, 0.0, 9.8]) + accel / np.sqrt(0.1) * rng.standard_normal((3000, 3))
+    record = ImuRecord(time, rates, forces, "rates")
+    still = motion_summary(record).still_fraction
+    assert still > 0.9 if stays else still < 0.1
+    assert (inspect(record).noise_from is not None and inspect(record).noise_from.kind == "still") == stays

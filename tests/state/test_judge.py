@@ -14,7 +14,7 @@ from truenorth.state.judge import Claim, judge, weight
 from truenorth.state.limits import limit
 from truenorth.state.remedies import REMEDIES
 from truenorth.state.titles import TITLES
-from truenorth.state.wording import headline, sentence
+from truenorth.state.wording import angle, headline, sentence
 
 RANK = {"good": 0, "level_only": 1, "not_converged": 2, "not_observable": 2, "inconsistent": 3}
 sizes = st.one_of(st.just(0.0), st.floats(1e-9, 1e3), st.just(math.inf))
@@ -161,3 +161,15 @@ def test_figures_are_shown_in_their_units():
     assert item.to_dict()["effect"] == {"heading": 0.1}
     assert headline("inconsistent", (item,)) == "The gyros contradict the place or their specification"
     assert headline("aligned", (item,)) == "Aligned"
+
+
+def test_no_effect_is_larger_than_half_a_turn():
+    """What a linear model makes of a large error, such as "heading moves by 4156.11 deg", is no angle."""
+    degrees = [0.004, 0.4, 0.6, 179.0, 181.0, 4156.11, math.inf]
+    assert [angle(math.radians(x)) for x in degrees] == [
+        "0.24 arcmin",
+        "24.00 arcmin",
+        "0.60 deg",
+        "179.00 deg",
+        *3 * ["more than 180 deg"],
+    ]

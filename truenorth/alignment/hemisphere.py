@@ -71,7 +71,7 @@ def hemisphere_evidence(
     Parameters
     ----------
     match : Match
-        Of :func:`hemisphere_signature`.
+        Of :func:`hemisphere_signature`, by :func:`truenorth.alignment.matched.matched_whole`.
     fine : FineAlignment
     position : Position
     elsewhere : callable, optional

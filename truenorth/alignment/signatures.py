@@ -14,7 +14,7 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
 from truenorth.alignment.loud_rows import loud_rows_evidence
 from truenorth.alignment.masked import masked_evidence
-from truenorth.alignment.matched import innovations_of, matched
+from truenorth.alignment.matched import innovations_of, matched, matched_whole
 from truenorth.alignment.steps_in_turn import steps_in_turn
 from truenorth.alignment.sway_noise import sway_noise_evidence
 from truenorth.alignment.swaying import SwayAlignment
@@ -48,11 +48,12 @@ def what_begins(
         Whether the base does: then the colour of the innovations counts.
     """
     seen = innovations_of(fine, others)
-    banks = drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
-    drift, bias, gravity = matched(seen, *banks)
+    banks = drift_signatures(fine), bias_signatures(fine)
+    drift, bias = matched(seen, *banks)
+    gravity = matched_whole(seen, hemisphere_signature(fine, position))
     rival = float(max(drift.ratio.max(), bias.ratio.max()))
     if sways:
-        drift, bias = weighed_by_colour(seen, banks[:2], (drift, bias))
+        drift, bias = weighed_by_colour(seen, banks, (drift, bias))
     in_turn = sways and not given
     steps = steps_in_turn(fine, spec, bias, others) if in_turn else bias_step_evidence(fine, spec, bias)
     steps += masked_evidence(fine, spec)

@@ -13,7 +13,7 @@ from truenorth.errors.staying import STARTS
 
 # States, rows of the measurement, states with all courses, and columns of innovations, of a base at rest: written in a kernel, they
 # save it a quarter of its time (:data:`truenorth.filters.gains.AT_REST`).
-AT_REST = 12, 3, 23, 1
+AT_REST = 12, 3, 22, 1
 
 
 @compiled

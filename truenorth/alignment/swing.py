@@ -16,7 +16,7 @@ from truenorth.alignment.bias_step import bias_signatures
 from truenorth.alignment.drift import drift_signatures
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_signature
-from truenorth.alignment.matched import innovations_of, matched
+from truenorth.alignment.matched import innovations_of, matched, matched_whole
 from truenorth.alignment.swing_fit import MOST, is_swing, long_enough
 from truenorth.core.position import Position
 from truenorth.errors.sway import AxisMotion, Oscillator
@@ -85,5 +85,7 @@ def swing_note(motion: Sequence[AxisMotion]) -> Evidence:
 
 def _likeliest(fine: FineAlignment, position: Position) -> float:
     """Twice the logarithm of the likelihood ratio of the best of what innovations may show to have begun."""
-    banks = drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
-    return max(float(match.ratio.max()) for match in matched(innovations_of(fine), *banks))
+    seen = innovations_of(fine)
+    begun = matched(seen, drift_signatures(fine), bias_signatures(fine))
+    bent = matched_whole(seen, hemisphere_signature(fine, position))
+    return max(float(match.ratio.max()) for match in (*begun, bent))

@@ -82,12 +82,17 @@ def make_task(record: ImuRecord, position: Position, at: float | None) -> Task:
 
 
 def last_part(task: Task) -> Task:
-    """The last two minutes before the epoch: level needs no more, and a poor gyro's bias changes over longer."""
+    """The last two minutes before the epoch: level needs no more, and a poor gyro's bias changes over longer.
+
+    An epoch between two samples needs the one behind it, too: the turn up to it is a part of that sample's.
+    """
     record, at = task.record, task.epoch.time
     if record.duration <= LONGEST_BLIND:
         return task
     stop = max(at, record.time[0] + LONGEST_BLIND)
-    record = record.between(stop - LONGEST_BLIND, stop)
+    first = int(np.searchsorted(record.time, stop - LONGEST_BLIND)) if at == stop else 0
+    behind = task.epoch.row + int(at > record.time[task.epoch.row])
+    record = record[first : max(int(np.searchsorted(record.time, stop, "right")), behind + 1)]
     return replace(
         task,
         record=record,

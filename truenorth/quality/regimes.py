@@ -45,6 +45,12 @@ STILL, DISTURBED, SWAYING, ROTATING, MOVING = range(5)
 TURN_WINDOW = 21  # s, odd; a sway cancels in it, a turn does not
 NOISE_FACTOR = 4.0  # wander beyond this many times the noise's: below 1e-6 a window by chance
 QUIETEST = 3.0  # times the wander of the quietest window: white noise has more in one of a million windows
+LOUD_GYRO = (
+    np.radians(10.0) / 60.0
+)  # rad/sqrt(s): ten times a consumer gyro's; no MEMS at rest is louder, sampled slowly or not ...
+LOUD_FORCE = (
+    0.03  # m/s^2/sqrt(Hz), of three axes: ... where the accelerometers are ten times as loud as a consumer's, too
+)
 ONE_VALUE = 1e-9  # rad: wander of a window of equal rows, up to rounding
 SWAY_ANGLE = np.radians(1.0)  # amplitude from which an oscillation is called swaying
 TURN_RATE = np.radians(0.5)  # rad/s
@@ -111,7 +117,7 @@ class MotionSummary:
         What was taken out (sensor bias and earth rate).
     angle_noise : (3,) array, rad/sqrt(s)
         Angle random walk of the quiet quarter of the record, or of its quietest 10 s where that is less; vibration above 2 Hz
-        counts as noise.
+        counts as noise. No more than gyros have where the accelerometers are too loud for rest as well.
     regimes : tuple of Regime
         Stretches in order, without holes.
     """
@@ -178,24 +184,27 @@ class MotionSummary:
         return float(np.sqrt(np.mean(self.acceleration**2))) if self.time.size else np.nan
 
     def longest(self, *kinds: Kind) -> Regime | None:
-        """Find the longest stretch in which only these kinds occur; None where there is none."""
-        best: Regime | None = None
-        run: Regime | None = None
+        """Find the longest stretch in which only these kinds occur, the first of equals; None where there is none."""
+        return max(self.stretches(*kinds), key=lambda run: run.duration, default=None)
+
+    def stretches(self, *kinds: Kind) -> list[Regime]:
+        """All stretches in which only these kinds occur, in order."""
+        runs: list[Regime] = []
+        joined = False
         for regime in self.regimes:
-            if regime.kind not in kinds:
-                run = None
-                continue
-            run = Regime(run.start if run else regime.start, regime.stop, regime.kind)
-            if best is None or run.duration > best.duration:
-                best = run
-        return best
+            if regime.kind in kinds:
+                start = runs.pop().start if joined else regime.start
+                runs.append(Regime(start, regime.stop, regime.kind))
+            joined = regime.kind in kinds
+        return runs
 
 
 @remembered
 def motion_summary(record: ImuRecord) -> MotionSummary:
     """Tell the kinds of motion of a record apart.
 
-    Gaps are bridged by interpolation; a second inside a gap takes the kind of its neighbours.
+    Gaps are bridged by interpolation; a second inside a gap takes the stronger kind of its neighbours: a straight line would
+    show rest where nothing was seen.
 
     Parameters
     ----------
@@ -213,7 +222,7 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
 
     noise = white_noise(record)
     wander = angle_wander(rates[:3], interval, per_second)  # (3, windows), of each window of up to 10 s
-    angle_noise, force_noise = _no_motion(noise[:3], wander, seconds), noise[3:]
+    angle_noise, force_noise = _no_motion(noise, wander, seconds), noise[3:]
     bias = rate_bias(rates[:3], wander, per_second, angle_noise)
     force = second_means(rates[3:], per_second)
     still_gravity = bias_by_gravity(second_means(rates[:3], per_second), force)
@@ -239,7 +248,17 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
         rate_noise=length_of(angle_noise),
     )
     time = record.time[0] - record.interval + per_second * interval * np.arange(1, seconds + 1)
+    _as_around_gaps(kind, time, record)
     return MotionSummary(time, kind, rate.T, force.T, motion, around, bias, angle_noise, _stretches(time, kind, record))
+
+
+def _as_around_gaps(kind: NDArray[np.int8], time: Array, record: ImuRecord) -> None:
+    """Give seconds (m,) that end at these times, and of which a gap leaves no row, the stronger kind of those around it."""
+    for k in record.gaps:
+        # The first of them begins at or after the last row, the last one ends before the row behind the gap.
+        first, behind = (int(np.searchsorted(time, record.time[i])) for i in (k - 1, k))
+        if first + 1 < behind:
+            kind[first + 1 : behind] = kind[first : behind + 1 : behind - first].max()
 
 
 def _near(surely: NDArray[np.bool_], maybe: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -252,14 +271,16 @@ def _walk(seconds: int) -> float:
     return float(np.sqrt(min(WINDOW, seconds) / 15.0))
 
 
-def _no_motion(angle_noise: Array, wander: Array, seconds: int) -> Array:
-    """(3,) white noise that leaves a window as quiet as the quietest one.
+def _no_motion(noise: Array, wander: Array, seconds: int) -> Array:
+    """(3,) white noise of the gyros, of that of all sensors (6,), that leaves a window as quiet as the quietest one.
 
     The quiet quarter of a log that rests less than a quarter is in motion, and rough ground or steps look white. A sensor's noise
-    is there at rest, too. An axis that stands on one value for a window is coarse, or stuck, and shows no noise.
+    is there at rest, too. An axis that stands on one value for a window is coarse, or stuck, and shows no noise. And where a log
+    never rests, as of a walk at 10 Hz, its gyros and accelerometers are louder than any: no more than a gyro's is noise.
     """
-    quietest = wander.min(axis=1)
-    return np.where(quietest > ONE_VALUE, np.minimum(angle_noise, QUIETEST * quietest / _walk(seconds)), angle_noise)
+    quietest, gyro = wander.min(axis=1), noise[:3]
+    found = np.where(quietest > ONE_VALUE, np.minimum(gyro, QUIETEST * quietest / _walk(seconds)), gyro)
+    return np.minimum(found, LOUD_GYRO) if length_of(noise[3:]) > LOUD_FORCE else found
 
 
 def _unknown(record: ImuRecord) -> MotionSummary:

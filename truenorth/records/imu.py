@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.records.base import Guess, Record
+from truenorth.records.tables import numbers_of, times_of
 
 Array = NDArray[np.float64]
 # rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
@@ -135,14 +136,15 @@ class ImuRecord(Record):
         ----------
         table : ImuRecord, DataFrame or xarray.Dataset
             Columns ``gyro_x .. accel_z`` of rates (rad/s, m/s^2) or ``dtheta_x .. dvel_z`` of increments (rad, m/s), named as
-            `to_frame` names them; ``time`` (s) as a column or the index, which may hold dates too.
+            `to_frame` names them; ``time`` (s) as a column or the index, which may hold durations, or dates: these become
+            seconds since 1970, as in every reader.
         axes : str
             Where x, y and z point, such as ``"FRD"``, see :func:`truenorth.read_imu`.
 
         Raises
         ------
         UsageError
-            Something else, a table without these columns, or axes that do not exist.
+            Something else, a table without these columns or without time, or axes that do not exist.
         """
         from truenorth.core.attitude import body_axes
 
@@ -161,15 +163,8 @@ class ImuRecord(Record):
                 f"{', '.join(COLUMNS['increments'])}, and time, in rad and m: rename and convert them, or let read_imu read the "
                 "file, which finds names and units"
             )
-        time = table["time"] if "time" in table.columns else table.index
-        if getattr(time.dtype, "kind", "") == "M":
-            time = (
-                (time - time[0]) / np.timedelta64(1, "s")
-                if time is table.index
-                else (time - time.iloc[0]).dt.total_seconds()
-            )
-        values = np.array(table[list(COLUMNS[kind])], dtype=np.float64)
-        record = cls(np.array(time, dtype=np.float64), values[:, :3], values[:, 3:], kind, "table")
+        values = numbers_of(table, COLUMNS[kind])
+        record = cls(times_of(table), values[:, :3], values[:, 3:], kind, "table")
         return record if axes == "RFU" else record.rotated(body_axes(axes))
 
     def rotated(self, C_new_old: ArrayLike) -> ImuRecord:

@@ -56,8 +56,10 @@ def _filled(template: str, figures: Mapping[str, Any]) -> str:
 
 
 def angle(x: float) -> str:
-    """An angle for people: ``0.51 deg``, ``12.30 arcmin``."""
+    """An angle for people: ``0.51 deg``, ``12.30 arcmin``; an effect beyond half a turn, as of a linear model, has no size."""
     degrees = math.degrees(x)
+    if degrees > 180.0:
+        return translated("more than 180 deg")
     return f"{degrees:.2f} deg" if degrees >= 0.5 else f"{degrees * 60:.2f} arcmin"
 
 
