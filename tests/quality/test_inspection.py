@@ -42,6 +42,20 @@ def test_gaps_and_jitter():
     assert found.sampling.jitter_rms == pytest.approx(0.003 * np.sqrt(2.0 / 3.0), rel=0.05)
 
 
+def test_a_rest_of_which_no_row_was_written():
+    """The longest still stretch lay inside a gap of 60 s: the log was refused for a window that nobody had asked for."""
+    record = base(duration=200.0)
+    swing = np.where(np.abs(record.time - 130.0) > 32.0, 0.5 * np.sin(1.7 * record.time), 0.0)
+    moved = record.gyro + swing[:, None] * [1.0, -1.0, 1.0]
+    there = (record.time < 100.0) | (record.time > 160.0)
+    found = inspect(ImuRecord(record.time[there], moved[there], record.accel[there]))
+    rest = found.motion.longest("still")
+    assert rest is not None
+    assert 90.0 < rest.start < rest.stop < 170.0
+    assert found.noise_from is None
+    assert {"gaps", "no_rest"} <= codes(found)
+
+
 def test_frozen_and_dead_channels():
     record = base(duration=60.0)
     gyro, accel = record.gyro.copy(), record.accel.copy()

@@ -255,19 +255,22 @@ def _noise_at_rest(
     from truenorth.analysis.allan import SHORTEST_RECORD
     from truenorth.quality.noise import noise_coefficients
 
-    for kinds in (("still",), ("still", "disturbed")):
-        rest = motion.longest(*kinds)
-        if rest is None or rest.duration < SHORTEST_REST:
-            continue
-        # A motion begins softly: its first and last moments are left to it.
-        start = rest.start if rest.start <= record.time[0] else rest.start + REST_MARGIN
-        stop = rest.stop if rest.stop >= record.time[-1] else rest.stop - REST_MARGIN
-        part = _longest_without_gap(record.between(start, stop))
-        if part.duration < SHORTEST_REST or len(part) < SHORTEST_RECORD:
-            continue
-        gyro, accel = noise_coefficients(part)
-        kind: Kind = "still" if kinds == ("still",) else "disturbed"
-        return gyro, accel, Regime(float(part.time[0] - part.interval), float(part.time[-1]), kind)
+    kind: Kind
+    for kinds, kind in ((("still",), "still"), (("still", "disturbed"), "disturbed")):
+        for rest in sorted(motion.stretches(*kinds), key=lambda run: -run.duration):
+            if rest.duration < SHORTEST_REST:
+                break
+            # A motion begins softly: its first and last moments are left to it.
+            start = rest.start if rest.start <= record.time[0] else rest.start + REST_MARGIN
+            stop = rest.stop if rest.stop >= record.time[-1] else rest.stop - REST_MARGIN
+            first, last = np.searchsorted(record.time, start, "left"), np.searchsorted(record.time, stop, "right")
+            if last - first < SHORTEST_RECORD:
+                continue  # inside a gap, or nearly so
+            part = _longest_without_gap(record[first:last])
+            if part.duration < SHORTEST_REST or len(part) < SHORTEST_RECORD:
+                continue
+            gyro, accel = noise_coefficients(part)
+            return gyro, accel, Regime(float(part.time[0] - part.interval), float(part.time[-1]), kind)
     findings.append(
         Finding(
             "note",

@@ -178,17 +178,19 @@ class MotionSummary:
         return float(np.sqrt(np.mean(self.acceleration**2))) if self.time.size else np.nan
 
     def longest(self, *kinds: Kind) -> Regime | None:
-        """Find the longest stretch in which only these kinds occur; None where there is none."""
-        best: Regime | None = None
-        run: Regime | None = None
+        """Find the longest stretch in which only these kinds occur, the first of equals; None where there is none."""
+        return max(self.stretches(*kinds), key=lambda run: run.duration, default=None)
+
+    def stretches(self, *kinds: Kind) -> list[Regime]:
+        """All stretches in which only these kinds occur, in order."""
+        runs: list[Regime] = []
+        joined = False
         for regime in self.regimes:
-            if regime.kind not in kinds:
-                run = None
-                continue
-            run = Regime(run.start if run else regime.start, regime.stop, regime.kind)
-            if best is None or run.duration > best.duration:
-                best = run
-        return best
+            if regime.kind in kinds:
+                start = runs.pop().start if joined else regime.start
+                runs.append(Regime(start, regime.stop, regime.kind))
+            joined = regime.kind in kinds
+        return runs
 
 
 @remembered
