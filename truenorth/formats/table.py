@@ -33,6 +33,7 @@ from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
 from truenorth.formats.counts import counts_above, device_above, orientation_above
 from truenorth.formats.guesses import UnsureError, in_words, take
+from truenorth.formats.gyro_step import by_step
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.formats.names import heading_of, plain
 from truenorth.formats.repeats import without_repeats
@@ -224,7 +225,7 @@ def _units(
         if known is not None and not _contradicts(facts, known[0]):
             guesses.append(Guess("unit of the gyros", known[0], known[1], 1.0, {"units": {"gyro": known[0]}}))
             return kind, {**said, "gyro": known[0]}
-        readings = gyro_readings(facts, kind, said["accel"])
+        readings = _gyro_readings(facts, gyro, kind, said["accel"])
         if not readings:
             raise DataError(
                 f"{source}: the gyros' values are those of a gyro in no usual unit; say the unit, or check that these are the gyros"
@@ -234,6 +235,12 @@ def _units(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
+
+
+def _gyro_readings(facts: GyroFacts, gyro: Array, kind: Kind, accel_unit: str) -> list[Reading]:
+    """By what gyros show, and of rates by the step of the numbers."""
+    readings = gyro_readings(facts, kind, accel_unit)
+    return by_step(readings, gyro) if kind == "rates" else readings
 
 
 def _contradicts(facts: GyroFacts, unit: str) -> bool:
@@ -297,7 +304,7 @@ def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str
         return
     if not accel_readings(gravity_level(accel), float(np.median(np.diff(time))), (kind,), (force,)):
         return  # what is no gravity in SI, the checks of plausibility name
-    readings = gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force)
+    readings = _gyro_readings(gyro_facts(time, gyro, accel, kind), gyro, kind, force)
     if readings and readings[0].unit != unit:
         best = readings[0]
         claim = next((r.why for r in readings if r.unit == unit), f"in {unit} they cannot be a gyro's")
