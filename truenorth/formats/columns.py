@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,6 +90,17 @@ class Columns:
             if anew is not None:
                 self.anew[name] = anew
         return time, said
+
+    def rows_of(self, keep: NDArray[np.intp], note: str) -> Columns:
+        """Some of the rows, with a note that says why."""
+        return replace(
+            self,
+            read=lambda names, gaps: self.read(names, gaps)[keep],
+            column=lambda name: self.column(name).take(keep),
+            place=lambda row: self.place(int(keep[row])),
+            whole={},
+            notes=(*self.notes, note),
+        )
 
     def _clock(self, name: str) -> tuple[Array, str | None]:
         if (name,) in self.whole:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.formats.behaviour import DEG, Reading, size
+from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
@@ -39,9 +40,9 @@ SHARE = 0.3  # of all logs have one
 DECADES = 3.0  # over which other steps lie
 
 
-def by_step(readings: list[Reading], gyro: Array) -> list[Reading]:
-    """Units of gyros (N, 3) whose numbers are rates, most likely first, weighed by the step of the numbers."""
-    step, unsure = step_of(gyro)
+def by_step(readings: list[Reading], gyro: Array, kind: Kind) -> list[Reading]:
+    """Units of gyros (N, 3), most likely first, weighed by the step of the numbers where they are rates."""
+    step, unsure = step_of(gyro) if kind == "rates" else (0.0, 0.0)
     if not step or not readings:
         return readings
     weighed = []

@@ -26,6 +26,7 @@ from truenorth.formats.behaviour import (
     is_usual,
     size,
 )
+from truenorth.formats.blank_rows import without_blank_rows
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.choice import choose
 from truenorth.formats.chosen import Choice
@@ -81,7 +82,7 @@ def _record_of(columns: Columns, layout: Layout) -> ImuRecord:
     source, columns = columns.path.name, with_angles(columns)
     choice = choose(columns, layout)
     guesses = choice.guesses
-    gyro, accel = _sensors(columns, layout, choice)
+    columns, (gyro, accel) = without_blank_rows(columns, choice.labels[1:], lambda log: _sensors(log, layout, choice))
     if choice.doubt is not None:
         raise choice.doubt
     columns, kept = without_repeats(columns, choice, gyro, accel)
@@ -225,7 +226,7 @@ def _units(
         if known is not None and not _contradicts(facts, known[0]):
             guesses.append(Guess("unit of the gyros", known[0], known[1], 1.0, {"units": {"gyro": known[0]}}))
             return kind, {**said, "gyro": known[0]}
-        readings = _gyro_readings(facts, gyro, kind, said["accel"])
+        readings = by_step(gyro_readings(facts, kind, said["accel"]), gyro, kind)
         if not readings:
             raise DataError(
                 f"{source}: the gyros' values are those of a gyro in no usual unit; say the unit, or check that these are the gyros"
@@ -235,12 +236,6 @@ def _units(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
-
-
-def _gyro_readings(facts: GyroFacts, gyro: Array, kind: Kind, accel_unit: str) -> list[Reading]:
-    """By what gyros show, and of rates by the step of the numbers."""
-    readings = gyro_readings(facts, kind, accel_unit)
-    return by_step(readings, gyro) if kind == "rates" else readings
 
 
 def _contradicts(facts: GyroFacts, unit: str) -> bool:
@@ -304,7 +299,7 @@ def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str
         return
     if not accel_readings(gravity_level(accel), float(np.median(np.diff(time))), (kind,), (force,)):
         return  # what is no gravity in SI, the checks of plausibility name
-    readings = _gyro_readings(gyro_facts(time, gyro, accel, kind), gyro, kind, force)
+    readings = by_step(gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force), gyro, kind)
     if readings and readings[0].unit != unit:
         best = readings[0]
         claim = next((r.why for r in readings if r.unit == unit), f"in {unit} they cannot be a gyro's")
