@@ -56,6 +56,7 @@ def test_a_fix_that_stands_on_each_row_is_one(androsensor):
     imu, fixes = read_imu(androsensor), read_gnss(androsensor)
     np.testing.assert_allclose(imu.accel, accel, atol=1e-8)
     np.testing.assert_allclose(imu.gyro, gyro, atol=1e-8)
+    assert ("unit of time", "ms", "the heading") in [guess[:3] for guess in imu.taken_for]
     np.testing.assert_allclose(fixes.time, np.arange(0.7, 10.0, 1.0), atol=1e-9)
     np.testing.assert_allclose(np.degrees(fixes.lat), 55.85 + 1e-5 * np.arange(1, 11), atol=1e-9)
     np.testing.assert_allclose(fixes.alt, 174.0)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
 from truenorth.formats.arrow import to_numpy
-from truenorth.formats.dates import dates_of
+from truenorth.formats.dates import dates_of, is_date
 from truenorth.formats.layout import BLOCKS
 from truenorth.formats.wraps import unwrapped
 
@@ -144,7 +144,7 @@ class Columns:
 
         plain = pd.Series([cell.strip() for cell in cells])
         try:
-            if "-" in cells[0] or "/" in cells[0] or re.match(r"\s*\d{1,2}\.\d{1,2}\.\d{4} ", cells[0]):
+            if is_date(cells[0]):
                 return dates_of(plain)
             if ":" in cells[0]:
                 time = pd.to_timedelta(plain.where(plain.str.count(":") == 2, "00:" + plain))
