@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from truenorth.aiding.magnetometer import earth_field
 from truenorth.cli import app
 from truenorth.core.attitude import euler_from_dcm
-from truenorth.core.errors import UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.formats import write_imu
 from truenorth.simulation import ideal_log, simulate
@@ -157,6 +157,21 @@ def test_clocks_by_sensor(files, tmp_path):
         result = aligned(*moved, "--offset", offset)
         assert isinstance(result.exception, UsageError)
         assert words in str(result.exception)
+
+
+def test_a_receiver_that_counts_from_1970(files, tmp_path):
+    """Its first fix gives the place of the magnetic field: that, too, is looked for by the clock that --offset corrects."""
+    folder, date = files[0], 1585958400
+    head, *rows = (folder / "plain.csv").read_text().splitlines()
+    cells = [row.partition(",") for row in rows]
+    dated = [f"{float(time) + date:.1f},{rest}" for time, _, rest in cells]
+    (tmp_path / "plain.csv").write_text("\n".join([head, *dated]) + "\n")
+    sensors = ("--gnss", tmp_path / "plain.csv", "--magnetometer", folder / "mag.csv", *MAGNETOMETER)
+    refused = call("align", folder / "imu.parquet", *IMU, *sensors)
+    assert isinstance(refused.exception, DataError)
+    assert f"{-date} s added to the times of the aiding log" in str(refused.exception)
+    mended = call("align", folder / "imu.parquet", *IMU, *sensors, "--offset", f"gnss={-date}", "--json")
+    assert json.loads(mended.stdout)["status"] == "aligned"
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from tests.formats.test_field_logs import MOVED, G, is_read, rows
 from tests.formats.test_second_reading import notes
 from truenorth.aiding.sensors import from_gnss
 from truenorth.core.errors import DataError
-from truenorth.formats import UnsureError, read_gnss, read_imu
+from truenorth.formats import UnsureError, read_gnss, read_height, read_imu
 from truenorth.state.mounting import Mounting
 
 N = len(MOVED.time)
@@ -218,3 +218,38 @@ def test_an_infinite_number_of_satellites_of_a_vbox_is_no_fix(tmp_path):
     lines[k] = " ".join(["9" * 400, *lines[k].split()[1:]])
     path.write_text("\n".join(lines) + "\n")
     assert np.isfinite(read_gnss(path).lat).sum() == 9
+
+
+# -------------------------------------------------------------------------------------------------- headings of loggers
+
+
+def test_headings_of_betaflights_decoder(tmp_path):
+    """Elements of arrays with a unit behind them; the size of a count of the accelerometers, which it does not write, is asked."""
+    names = [f"gyroADC[{k}] (deg/s)" for k in range(3)] + [f"accSmooth[{k}]" for k in range(3)]
+    head = ", ".join(["time (us)", *names, "motor[0]"]) + "\n"
+    counts = np.round(MOVED.accel / G * 2048.0)
+    table = rows(1e6 * MOVED.time, MOVED.gyro / DEG, counts, 137.0 + 0.0 * MOVED.time)
+    (tmp_path / "log.csv").write_text(head + table)
+    with pytest.raises(DataError, match=r"the accelerometers show 20.* counts, say how large one is"):
+        read_imu(tmp_path / "log.csv")
+    record = read_imu(tmp_path / "log.csv", units={"accel": "0.00048828125 g"})
+    np.testing.assert_allclose(record.gyro, MOVED.gyro, atol=1e-6)
+    np.testing.assert_allclose(record.accel, MOVED.accel, atol=0.005)
+
+
+def test_stamps_with_underscores(tmp_path):
+    stamps = [f"2026_06_15_18_{59 if t < 30 else 0:02d}_{t % 60.0:06.3f}" for t in (20.0, 20.25, 20.5)]
+    (tmp_path / "log.csv").write_text("time,alt\n" + "".join(f"{stamp},{k}\n" for k, stamp in enumerate(stamps)))
+    record = read_height(tmp_path / "log.csv")
+    np.testing.assert_allclose(record.time - 1781549960.0, [0.0, 0.25, 0.5])
+
+
+def test_counts_of_gyros_are_not_said_to_show_gravity(tmp_path):
+    """Their offset was taken for it."""
+    rng = np.random.default_rng(1)
+    gyro = np.round(rng.normal([500.0, 500.0, 680.0], 2.0, (500, 3)))
+    accel = np.round(rng.normal(0.0, 300.0, (500, 3)))
+    table = "".join(",".join(f"{v:.0f}" for v in (k, *f, *w)) + "\n" for k, (f, w) in enumerate(zip(accel, gyro)))
+    (tmp_path / "log.dat").write_text("SampleNumber,AccX,AccY,AccZ,GyroR,GyroP,GyroY\n" + table)
+    with pytest.raises(DataError, match=r"no columns of an IMU among .*name the columns"):
+        read_imu(tmp_path / "log.dat", rate=100.0)

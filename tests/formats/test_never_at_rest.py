@@ -86,3 +86,37 @@ def test_a_node_that_breaks_the_definition_of_its_message_is_asked_about(tmp_pat
     for unit in (1.0, DEG):
         with pytest.raises(UnsureError, match="unit of the gyros is not sure"):
             read_imu(write(tmp_path / "imu.csv", gyro / unit, accel, head=head), rate=RATE)
+
+
+def hovering(rng, rate=200.0):
+    """A drone for a minute, rad/s and m/s^2: thrust along its own vertical hides gravity's turn, its rows shake."""
+    shape = (int(60.0 * rate), 3)
+
+    def gust(tau):
+        return gaussian_filter1d(rng.standard_normal(shape), tau * rate, axis=0) * np.sqrt(
+            2.0 * tau * rate * np.sqrt(np.pi)
+        )
+
+    gyro = 0.2 * gust(0.15) + [0.01, -0.01, -0.14] + 0.1 * rng.standard_normal(shape)
+    accel = [0.0, 0.0, G] + [0.05, 0.05, 0.6] * gust(0.3) + 0.02 * rng.standard_normal(shape)
+    return np.arange(1, shape[0] + 1) / rate, gyro, accel
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("of_gyro", "unit"), [(1.0, "rad/s"), (DEG, "deg/s")])
+def test_a_drone_that_hovers(seed, of_gyro, unit):
+    """Its rates of 10 deg/s in rad/s were taken for deg/s of a sensor at rest, of 32 times the earth's rate."""
+    time, gyro, accel = hovering(np.random.default_rng(seed))
+    facts = gyro_facts(time, gyro / of_gyro, accel, "rates")
+    assert facts.restless
+    best = gyro_readings(facts, "rates", "g")[0]
+    assert best.unit == unit or best.probability < SURE_GYRO
+
+
+def test_a_base_that_trembles_is_at_rest():
+    """It turns as much, and no force goes to and fro."""
+    time, gyro, accel = hovering(np.random.default_rng(1))
+    at_rest = G * accel / np.linalg.norm(accel, axis=1, keepdims=True)
+    assert not gyro_facts(time, gyro, at_rest, "rates").restless
+    quiet = gyro_facts(time, 0.01 * np.random.default_rng(2).standard_normal(gyro.shape), accel, "rates")
+    assert not quiet.restless

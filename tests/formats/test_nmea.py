@@ -8,6 +8,9 @@ import pytest
 import truenorth
 from truenorth.core.errors import DataError
 
+MIDNIGHT = 764380800.0  # of 23 March 1994, s since 1970
+DAY = 86400.0
+
 
 def sentence(body):
     return f"${body}*{reduce(lambda a, b: a ^ b, body.encode(), 0):02X}"
@@ -17,8 +20,12 @@ def gga(time, quality=1):
     return sentence(f"GPGGA,{time},4807.038,N,01131.000,W,{quality},08,0.9,545.4,M,46.9,M,,")
 
 
-def rmc(time, status="A", speed="022.4", course="084.4"):
-    return sentence(f"GNRMC,{time},{status},4807.038,N,01131.000,W,{speed},{course},230394,003.1,W")
+def rmc(time, status="A", speed="022.4", course="084.4", date="230394"):
+    return sentence(f"GNRMC,{time},{status},4807.038,N,01131.000,W,{speed},{course},{date},003.1,W")
+
+
+def zda(time, date="23,03,1994"):
+    return sentence(f"GPZDA,{time},{date},00,00")
 
 
 def vtg(speed, course):
@@ -41,7 +48,7 @@ def test_the_example_of_the_standard(tmp_path):
     ]
     assert lines[0].endswith("*" + lines[0][-2:])
     record = read(tmp_path, lines)
-    np.testing.assert_allclose(record.time, [45319.5, 45320.0])
+    np.testing.assert_allclose(record.time - MIDNIGHT, [45319.5, 45320.0])
     np.testing.assert_allclose(np.degrees(record.lat), 48 + 7.038 / 60, rtol=1e-15)
     np.testing.assert_allclose(np.degrees(record.lon), -(11 + 31 / 60), rtol=1e-15)
     np.testing.assert_allclose(record.alt, 545.4 + 46.9)
@@ -76,7 +83,7 @@ def test_standing_no_fix_and_midnight(tmp_path):
         rmc("000001", "A", "1", "90"),
     ]
     record = read(tmp_path, lines)
-    assert record.time.tolist() == [86399.0, 86400.0, 86401.0]
+    assert (record.time - MIDNIGHT).tolist() == [-1.0, 0.0, 1.0]  # the date is that of the fix
     assert record.has_position.tolist() == [False, True, True]
     assert record.has_velocity.tolist() == [False, True, True]
     assert record.v_n[1, :2].tolist() == [0.0, 0.0]
@@ -86,6 +93,42 @@ def test_the_content_tells_and_broken_ends_are_passed_over(tmp_path):
     lines = ["038,N,01131.000,W,1,08*00", gga("120000"), gga("120001"), gga("120002")[:40]]
     assert len(read(tmp_path, lines, "log.txt")) == 2
     assert len(read(tmp_path, [gga("120000")[:-9] + "*00", *lines[1:]], "log.txt")) == 2
+
+
+def test_dates_count_from_1970_and_pass_midnight(tmp_path):
+    """A sentence without a date is of the day of the dated one next to it; so after a day without any."""
+    lines = [gga("235958"), rmc("235958"), gga("235959"), gga("000000"), rmc("000000", date="240394"), gga("000001")]
+    after = [gga("190000"), rmc("190000", date="260394"), gga("190001")]  # the logger was off, longer than a day
+    record = read(tmp_path, lines + after)
+    expected = [DAY - 2, DAY - 1, DAY, DAY + 1, 3 * DAY + 68400, 3 * DAY + 68401]
+    assert (record.time - MIDNIGHT).tolist() == expected
+    by_zda = [zda("120000"), gga("120000"), gga("120001"), rmc("120001", "V", date="060180")]
+    assert (read(tmp_path, by_zda).time - MIDNIGHT).tolist() == [43200.0, 43201.0]
+    assert read(tmp_path, [gga("120000"), rmc("120001", date="")]).time.tolist() == [43200.0, 43201.0]
+    assert read(tmp_path, [gga("235959"), gga("000000")]).time.tolist() == [86399.0, 86400.0]
+    undated = [gga("120000"), rmc("120001", "V", date="99")]
+    assert read(tmp_path, undated).time.tolist() == [43200.0, 43201.0]
+
+
+def test_a_date_that_is_late_at_midnight(tmp_path):
+    """Some receivers go on with the old date for a second."""
+    days = ["230394"] * 6 + ["240394"] * 5
+    clocks = [f"23595{k}" for k in range(5, 10)] + [f"00000{k}" for k in range(6)]
+    record = read(tmp_path, [rmc(clock, date=day) for clock, day in zip(clocks, days, strict=True)])
+    assert (record.time - MIDNIGHT).tolist() == [DAY - 5 + k for k in range(11)]
+
+
+def test_a_log_that_a_spreadsheet_saved(tmp_path):
+    """Commas behind the checksum, and no zeros in front of ``050420``: the checksum shows that they were there."""
+    lines = [gga("090000") + ",,,,", rmc("090001", date="050420") + ",,", rmc("090002", date="050420") + ",,"]
+    whole = read(tmp_path, lines)
+    cut = [line.replace(",050420,", ",50420,").replace(",0900", ",900").replace(",01131.", ",1131.") for line in lines]
+    saved = read(tmp_path, cut)
+    for name in ("time", "lat", "lon"):
+        np.testing.assert_array_equal(getattr(saved, name), getattr(whole, name))
+    assert saved.time[0] == 1586077200.0  # 5 April 2020, 9:00
+    with pytest.raises(DataError, match="line 2: checksum"):
+        read(tmp_path, [cut[0], cut[1].replace("022.4", "022.5"), cut[2]])
 
 
 @pytest.mark.parametrize(
@@ -101,6 +144,8 @@ def test_the_content_tells_and_broken_ends_are_passed_over(tmp_path):
         (sentence("GPGGA,120001,4807.038,N"), ["line 2: 4 fields", "cut short"]),
         (rmc("120001", speed="fast"), ["line 2, RMC: speed 'fast'"]),
         (rmc("120001", course="1e490"), ["line 2, RMC: course '1e490'"]),
+        (rmc("120001", date="310294"), ["line 2, RMC: date '310294'", "ddmmyy"]),
+        (zda("120001", "23,x,1994"), ["line 2, ZDA: date '23/x/1994'", "day, month and year"]),
         (gga("115949"), ["line 2, column time", "goes back"]),
     ],
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from truenorth.core.errors import DataError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_imu
 from truenorth.formats.gnss import read_gnss
 
@@ -56,6 +56,7 @@ def test_a_fix_that_stands_on_each_row_is_one(androsensor):
     imu, fixes = read_imu(androsensor), read_gnss(androsensor)
     np.testing.assert_allclose(imu.accel, accel, atol=1e-8)
     np.testing.assert_allclose(imu.gyro, gyro, atol=1e-8)
+    assert ("unit of time", "ms", "the heading") in [guess[:3] for guess in imu.taken_for]
     np.testing.assert_allclose(fixes.time, np.arange(0.7, 10.0, 1.0), atol=1e-9)
     np.testing.assert_allclose(np.degrees(fixes.lat), 55.85 + 1e-5 * np.arange(1, 11), atol=1e-9)
     np.testing.assert_allclose(fixes.alt, 174.0)
@@ -102,14 +103,19 @@ def test_what_a_phone_says_of_a_fix(tmp_path, known):
         assert fixes.velocity_sigma is None
 
 
-def test_phyphox(tmp_path):
+@pytest.mark.parametrize("unit", ["m", "°"])
+def test_phyphox(tmp_path, unit):
+    """It writes degrees over a height's accuracy, which is in metres."""
     names = ("Time (s)", "Latitude (°)", "Longitude (°)", "Height (m)", "Velocity (m/s)", "Direction (°)",
-             "Horizontal Accuracy (m)", "Vertical Accuracy (m)")  # fmt: skip
+             "Horizontal Accuracy (m)", f"Vertical Accuracy ({unit})")  # fmt: skip
     values = (range(10), [55.85] * 10, [37.48] * 10, [100.0] * 10, [2.0] * 10, [90.0] * 10, [3.03] * 10, [4.0] * 10)
     quoted = [f'"{name}"' for name in names]
     fixes = read_gnss(write(tmp_path / "Location.csv", quoted, [cells(v, ",") for v in values], ";"))
     np.testing.assert_allclose(fixes.v_n[0, :2], [2.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(fixes.position_sigma[0], [2.0, 2.0, 4.0])
+    assert ("Vertical Accuracy (°) in m" in fixes.source) == (unit == "°")
+    with pytest.raises(UsageError, match="vertical_accuracy cannot be in 'deg'"):
+        read_gnss(tmp_path / "Location.csv", units={"vertical_accuracy": "deg"})
 
 
 TOOLBOX = ("time", "gFx", "gFy", "gFz", "wx", "wy", "wz")

@@ -48,6 +48,18 @@ def test_of_a_simulator_its_clock_is_a_third_file(tmp_path):
     np.testing.assert_allclose(record.accel, accel, atol=1e-8)
 
 
+def test_whole_seconds_with_milliseconds_next_to_them(tmp_path):
+    """The stamps repeat within each second; the other clock, since the start, increases in each row."""
+    gyro, accel = tilted(TIME)
+    second = [f"2019-06-12 22:{22 + k // 6000}:{k // 100 % 60:02d}" for k in range(ROWS)]
+    milliseconds = list(range(0, 10 * ROWS, 10))
+    for name, values in (("Gyroscope", gyro), ("Accelerometer", accel)):
+        write(tmp_path / f"{name}.csv", "Timestamp,Milliseconds,X,Y,Z", second, milliseconds, *values.T.tolist())
+    record = read_imu(tmp_path, units="rad/s,m/s^2")
+    np.testing.assert_allclose(record.time, TIME - TIME[0], atol=1e-6)
+    np.testing.assert_allclose(record.gyro, gyro, atol=1e-8)
+
+
 def test_of_a_phone_gravity_is_added_where_it_was_taken_out(tmp_path):
     (gyro, _), later = tilted(TIME), TIME + 0.004
     _, accel = tilted(later)

@@ -1,5 +1,7 @@
 """Arrays and binary rows that MATLAB toolboxes write: PSINS and NaveGo, read without options."""
 
+import struct
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -141,3 +143,28 @@ def test_a_file_of_matlab_without_numbers_says_what_it_has(tmp_path):
     savemat(tmp_path / "log.mat", {"notes": "moved", "names": np.array(["a", "b"], dtype=object)})
     with pytest.raises(DataError, match=r"log.mat: no arrays of numbers.*notes \(char\), names \(cell\).*save"):
         read_imu(tmp_path / "log.mat")
+
+
+def with_an_object(path):
+    """Add an object to a MATLAB file, as a port is saved: its shape is not written."""
+
+    def element(kind, data):
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    flags, number = element(6, struct.pack("<II", 17, 0)), element(6, struct.pack("<II", 13, 0))
+    names = b"".join(element(1, name) for name in (b"port", b"MCOS", b"serial"))
+    inner = number + element(5, struct.pack("<ii", 1, 1)) + element(1, b"") + element(6, struct.pack("<I", 7))
+    path.write_bytes(path.read_bytes() + element(14, flags + names + element(14, inner)))
+
+
+def test_an_object_among_the_arrays_is_left_out(tmp_path):
+    """The whole file was said to be damaged, or to hold an object."""
+    time = 0.01 * np.arange(300)
+    arrays = {"time": time, "gyro": np.full((300, 3), 0.1), "accel": np.tile([0.0, 0.0, 9.8], (300, 1))}
+    savemat(tmp_path / "log.mat", arrays)
+    with_an_object(tmp_path / "log.mat")
+    np.testing.assert_array_equal(read_imu(tmp_path / "log.mat", columns={"gyro": "gyro", "accel": "accel"}).time, time)
+    savemat(tmp_path / "none.mat", {"notes": "text"})
+    with_an_object(tmp_path / "none.mat")
+    with pytest.raises(DataError, match=r"none\.mat: no arrays of numbers.*object"):
+        read_imu(tmp_path / "none.mat")

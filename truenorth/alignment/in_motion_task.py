@@ -49,6 +49,7 @@ from truenorth.quality.swing import VELOCITIES, shown_arm, swing, unseen_swing, 
 from truenorth.quality.wheel_unit import check_unit
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
+from truenorth.records.overlap import no_overlap
 from truenorth.records.specified import corrected, seen_in
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
@@ -69,6 +70,7 @@ UNDER_WAY = 2.0  # m/s: fixes of some metres show half of that in `PACE` of a ve
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
+ANYWHERE = 1e5  # m, that a vehicle may have gone from its last fix: the clocks are apart
 
 
 @dataclass(frozen=True)
@@ -299,9 +301,14 @@ def _from_the_first_aid(
     ------
     AlignmentError
         Of a vehicle that drives until then, fewer seconds are aided than are needed.
+    DataError
+        All aiding begins after the end of the record, or ends before it begins.
     """
     begin = float(record.time[0])
-    first = min(float(log.time[0]) for log in (odometer, gnss) if log is not None)
+    logs = [log for log in (odometer, gnss) if log is not None]
+    first = min(float(log.time[0]) for log in logs)
+    if first > record.time[-1] or max(float(log.time[-1]) for log in logs) < begin:
+        raise no_overlap(logs[-1].source, _span(logs[-1]), record.source, _span(record))
     if first - begin < LONGEST_ALONE:
         return record, 0.0
     motion = motion_summary(record.between(begin, first))
@@ -349,13 +356,23 @@ def usual_antenna(gnss: GnssRecord | None) -> Mounting:
     return replace(ANTENNA, bias_sigma=usual_bias(gnss), bias_time=USUAL_TIME)
 
 
+def _span(log: ImuRecord | GnssRecord | OdometerRecord | VelocityRecord) -> tuple[float, float]:
+    return float(log.time[0]), float(log.time[-1])
+
+
 def has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
     """Whether there is a receiver with positions."""
     return gnss is not None and bool(gnss.has_position.any())
 
 
 def first_fix(record: ImuRecord, gnss: GnssRecord, odometer: OdometerRecord | VelocityRecord | None = None) -> Position:
-    """Where a log begins, by GNSS: no farther from the nearest fix than the vehicle goes in between, and while fixes are late."""
+    """Where a log begins, by GNSS: no farther from the nearest fix than the vehicle goes in between, and while fixes are late.
+
+    Raises
+    ------
+    DataError
+        All fixes come after the log, or so long before it that it may have begun anywhere.
+    """
     fixes = np.flatnonzero(gnss.has_position)
     nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
     alt = float(gnss.alt[nearest])
@@ -364,4 +381,6 @@ def first_fix(record: ImuRecord, gnss: GnssRecord, odometer: OdometerRecord | Ve
     at = float(gnss.time[nearest])
     gone = max(apart * speed_at(gnss, at), driven(odometer, *sorted((at, float(record.time[0])))))
     far, high = math.hypot(FIRST_FIX[0], gone), math.hypot(FIRST_FIX[1], gone)
+    if gnss.time[fixes[0]] > record.time[-1] or (gnss.time[fixes[-1]] < record.time[0] and far > ANYWHERE):
+        raise no_overlap(gnss.source, _span(gnss), record.source, _span(record))
     return Position(lat, lon, alt if np.isfinite(alt) else 0.0, far, high)

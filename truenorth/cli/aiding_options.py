@@ -63,8 +63,8 @@ Offset = Annotated[
 ]
 
 
-def shifted(aids: Sequence[Any], offset: str | None) -> list[Any]:
-    """Sensors with the times of their logs as --offset corrects them.
+def shifted(aids: Sequence[Any], offset: str | None, others: Sequence[str] = ()) -> list[Any]:
+    """Sensors with the times of their logs as --offset corrects them; `others` are keys of those that it may name as well.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def shifted(aids: Sequence[Any], offset: str | None) -> list[Any]:
 
     from truenorth.core.errors import UsageError
 
-    clocks = [aid.key for aid in aids if hasattr(aid, "record")]
+    clocks = list(dict.fromkeys([*(aid.key for aid in aids if hasattr(aid, "record")), *others]))
     late: dict[str, float] = {}
     for part in () if offset is None else offset.split(","):
         name, equals, seconds = part.rpartition("=")

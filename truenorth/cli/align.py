@@ -113,11 +113,14 @@ def align(
                 "on the move the errors of the IMU cannot be found from the log; expected --imu navigation, tactical, industrial, "
                 "consumer or a YAML file"
             )
-        found = moving.aids() if master.master is None else []
-        start = _first_place(record, found)
+        found = shifted(moving.aids() if master.master is None else [], moving.offset, pointing.keys)
+        directions: list[Any] = []
+        if pointing.named:
+            directions = pointing.aids(record, place or _first_place(record, found))
         aids: list[Any] = [
             *master.aids(indexer, moving),
-            *shifted([*found, *(pointing.aids(record, place or start) if pointing.named else [])], moving.offset),
+            *found,
+            *shifted(directions, moving.offset, [aid.key for aid in found]),
             *table.aids(),
             *indexer.aids(),
         ]
@@ -166,7 +169,8 @@ def _first_place(record: ImuRecord, aids: list[Any]) -> Position | None:
         return None
     from truenorth.alignment.in_motion_task import first_fix
 
-    return first_fix(record, fixes)
+    wheel = next((aid.record for aid in aids if aid.key in ("odometer", "velocity")), None)
+    return first_fix(record, fixes, wheel)
 
 
 def _latitude(place: Position | None, aids: list[Any]) -> float | None:

@@ -68,9 +68,14 @@ class OfAttitude:
     date: Annotated[str | None, option("Of the log, YYYY-MM-DD; its clock's own where that counts from 1970.")] = None
 
     @property
+    def keys(self) -> list[str]:
+        """The sensors that are named."""
+        return [key for key in ("attitude", "magnetometer") if getattr(self, key) is not None]
+
+    @property
     def named(self) -> bool:
         """Whether a sensor is named."""
-        return self.attitude is not None or self.magnetometer is not None
+        return bool(self.keys)
 
     def aids(self, record: ImuRecord, place: Position | None) -> list[Any]:
         """The sensors that are named; `place` is where the earth's field is taken."""

@@ -53,6 +53,13 @@ ANGLE_SCALE = 0.3  # of the logarithm, by which angles turn gravity more or less
 DECADE = 0.25  # decades by which those limits are soft
 SHAKEN = 3.0 * WORST_FORCE_WALK  # by motions that are quick from row to row
 MOVES = 8.0  # times the white noise of a row, that the gyros of a log at rest never show
+SLOW_CELL, RESTLESS, NEARLY_ALL = (
+    0.5,
+    5.0,
+    0.8,
+)  # s, how many times as far as by white noise its means differ, in how many tenths
+LITTLE = 0.1  # power of a likelihood at rest, of a log that does not rest and whose force does not turn, as of a drone that hovers
+PUSHED = 0.02  # of gravity, by which the force differs from one half of a second to the next
 LIVELY = 2.0 * DEG  # rad/s: as quickly as this turns at some time what turns its force; what is shaken, twice
 HINTS = 0.3  # share of gravity's turn that the gyros of a log without a rest explain by more than chance
 LEAST_HINT = 0.01  # likelihood of a unit that turns gravity too far, where quick motions hide most of its turn
@@ -145,6 +152,7 @@ class GyroFacts:
     largest: float
     force_walk: float
     moves: bool = False  # and rests nowhere: the noise is `walk` at most, the mean rate that of the motion
+    restless: bool = False  # moves in each part of the log by far more than the noise of its rows, which is `walk`
 
     @property
     def turned(self) -> bool:
@@ -171,7 +179,26 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
     parts = [part.mean(axis=0) for part in np.array_split(data[:, :3], 10)] if len(data) >= 100 else []
     wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
     mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
-    return GyroFacts(turning, mean, wander, walk, largest, force_walk, moves)
+    restless = is_noise and _restless(data, interval)
+    return GyroFacts(turning, mean, wander, walk, largest, force_walk, moves, restless)
+
+
+def _restless(data: Array, interval: float) -> bool:
+    """Whether in nearly each tenth of a log a base accelerates, and turns about two axes by far more than the noise of rows.
+
+    By means of half a second: at rest that noise is white, or that of a filter which leaves a fifth of it from row to row, biases
+    wander within minutes, and no force goes to and fro by `PUSHED` of gravity. A base that trembles on its legs turns as much.
+    """
+    rows = round(SLOW_CELL / interval)
+    cells = len(data) // max(rows, 1) // 10
+    if rows < 5 or cells < 8:
+        return False
+    parts = np.ascontiguousarray(data[: 10 * cells * rows].reshape(10, cells * rows, 6))
+    noise = np.mean(np.diff(parts[..., :3], axis=1) ** 2, axis=1)
+    slow = np.mean(np.diff(parts.reshape(10, cells, rows, 6).mean(axis=2), axis=1) ** 2, axis=1)
+    turns = np.sum(rows * slow[:, :3] > RESTLESS**2 * noise, axis=1) >= 2
+    pushed = np.sqrt(slow[:, 3:].sum(axis=1)) > PUSHED * gravity_level(data[:, 3:])
+    return bool(np.mean(turns & pushed) >= NEARLY_ALL)
 
 
 def _swing(gyro: Array) -> float:
@@ -263,6 +290,7 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
     if turned and min(abs(np.log(facts.turning.best_scale * size(unit))) for unit in priors) > NO_UNIT:
         return []
     shaken = facts.force_walk * size(accel_unit) > SHAKEN and np.isfinite(facts.turning.best_agreement)
+    flies = facts.restless and not np.isfinite(facts.turning.best_agreement)
     usual, weight = USUAL.get(accel_unit, ("", 1.0))
     readings = []
     for unit, prior in priors.items():
@@ -277,13 +305,18 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
             likely *= _in_motion(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
             why = f"in {unit} the rates of a log that never rests are up to {facts.largest * factor / DEG:.3g} deg/s"
         elif facts.walk > 0.0 and facts.mean_sigma < np.inf:
-            likely *= _at_rest(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
-            likely *= _of_one_class(facts.walk * factor, facts.force_walk * size(accel_unit))
+            rest = _at_rest(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
+            rest *= _of_one_class(facts.walk * factor, facts.force_walk * size(accel_unit))
+            likely *= rest**LITTLE if flies else rest
             walk = facts.walk * factor / DEG * 60.0
             why = (
                 f"in {unit} the mean rate is {facts.mean * factor / EARTH_RATE:.3g} times the earth's, the random walk "
                 f"{walk:.2g} deg/sqrt(h)"
             )
+            if flies:
+                why = (
+                    f"in {unit} the rates of a log that never rests are up to {facts.largest * factor / DEG:.3g} deg/s"
+                )
         else:
             why = "usual"
         if not turned and np.isfinite(facts.turning.best_agreement):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.behaviour import accel_readings, gravity_level
+from truenorth.formats.blank_rows import is_empty
 from truenorth.formats.chosen import Choice, with_time
 from truenorth.formats.columns import Columns, listed, missing_column
 from truenorth.formats.guesses import UnsureError
@@ -208,10 +209,10 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         gyros, accels = sets[kind]
         if not gyros or not accels:
             continue
-        gyros = _calibrated([axes for axes in gyros if not _of_angles(axes)])
+        gyros = _calibrated(_with_values(columns, [axes for axes in gyros if not _of_angles(axes)]))
         if not gyros:
             continue
-        accels = _calibrated(_with_gravity(columns, accels) if len(accels) > 1 else accels)
+        accels = _calibrated(_with_gravity(columns, _with_values(columns, accels)) if len(accels) > 1 else accels)
         if len(gyros) > 1 or len(accels) > 1:
             several = gyros if len(gyros) > 1 else accels
             sensor = BLOCKS[kind][0 if several is gyros else 1]
@@ -255,6 +256,13 @@ def _points_down(columns: Columns, axes: dict[str, Heading]) -> bool:
 def _calibrated(sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:
     """Of several sets of one sensor those that the log does not call uncalibrated."""
     return [axes for axes in sets if "uncal" not in axes["x"].family] or sets
+
+
+def _with_values(columns: Columns, sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:
+    """Of several sets of one sensor those that have values at all."""
+    if len(sets) < 2:
+        return sets
+    return [axes for axes in sets if not is_empty(columns, [axes[axis].name for axis in "xyz"])] or sets
 
 
 def _of_angles(axes: dict[str, Heading]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
 from truenorth.formats.arrow import to_numpy
-from truenorth.formats.dates import dates_of
+from truenorth.formats.dates import dates_of, is_date
 from truenorth.formats.layout import BLOCKS
 from truenorth.formats.wraps import unwrapped
 
@@ -91,6 +91,17 @@ class Columns:
                 self.anew[name] = anew
         return time, said
 
+    def rows_of(self, keep: NDArray[np.intp], note: str) -> Columns:
+        """Some of the rows, with a note that says why."""
+        return replace(
+            self,
+            read=lambda names, gaps: self.read(names, gaps)[keep],
+            column=lambda name: self.column(name).take(keep),
+            place=lambda row: self.place(int(keep[row])),
+            whole={},
+            notes=(*self.notes, note),
+        )
+
     def _clock(self, name: str) -> tuple[Array, str | None]:
         if (name,) in self.whole:
             return self.whole[name,], None
@@ -133,7 +144,7 @@ class Columns:
 
         plain = pd.Series([cell.strip() for cell in cells])
         try:
-            if "-" in cells[0] or "/" in cells[0] or re.match(r"\s*\d{1,2}\.\d{1,2}\.\d{4} ", cells[0]):
+            if is_date(cells[0]):
                 return dates_of(plain)
             if ":" in cells[0]:
                 time = pd.to_timedelta(plain.where(plain.str.count(":") == 2, "00:" + plain))

@@ -18,8 +18,15 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 YEAR_LAST = r"^(\d{1,2})([-/.])(\d{1,2})\2(\d{4}|\d{2})(?=\D|$)"
+UNDERSCORED = r"^(\d{4})_(\d\d)_(\d\d)_(\d\d)_(\d\d)_(\d\d(?:\.\d+)?)$"  # ``2026_06_15_18_59_10.238``
 MONTHS = 12
 UNKNOWN = "dates, the month first: no number of theirs shows that it is not the day; write ISO dates to be sure"
+
+
+def is_date(cell: str) -> bool:
+    """Whether a cell of text looks like a date."""
+    begins = re.match(r"\s*\d{1,2}\.\d{1,2}\.\d{4} ", cell) is not None
+    return "-" in cell or "/" in cell or begins or re.match(UNDERSCORED, cell.strip()) is not None
 
 
 def dates_of(cells: pd.Series) -> tuple[Array, str]:
@@ -35,6 +42,7 @@ def dates_of(cells: pd.Series) -> tuple[Array, str]:
     ValueError
         A cell that is no date, or of another form than the others.
     """
+    cells = cells.str.replace(UNDERSCORED, r"\1-\2-\3T\4:\5:\6", regex=True)
     parts = cells.str.extract(YEAR_LAST)
     if parts[0].isna().any() or not re.match(YEAR_LAST, cells.iloc[0]):
         return _seconds(cells), "dates"

@@ -84,9 +84,9 @@ def read_gnss(
 ) -> GnssRecord:
     """Read the log of a GNSS receiver.
 
-    A table of named columns, NMEA 0183 (GGA, RMC, VTG, HDT, THS), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's log
-    (u-blox, Septentrio, NovAtel, VectorNav, PX4, ArduPilot, an Android phone, ROS, KITTI). Of a folder of sensors, or a zip archive
-    of one, as phones write them, the file ``Location.csv`` or ``GPS.csv``.
+    A table of named columns, NMEA 0183 (GGA, RMC, VTG, HDT, THS, ZDA), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's
+    log (u-blox, Septentrio, NovAtel, VectorNav, PX4, ArduPilot, an Android phone, ROS, KITTI). Of a folder of sensors, or a zip
+    archive of one, as phones write them, the file ``Location.csv`` or ``GPS.csv``.
 
     Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,
     up`` (or ``down``) from an `origin`; velocity as ``VE, VN, VU`` (or ``VD``), ``ecef_vx, ecef_vy, ecef_vz``, or ``speed`` and
@@ -109,7 +109,8 @@ def read_gnss(
     Returns
     -------
     GnssRecord
-        Time is that of the file; in NMEA logs seconds from midnight (UTC) of the first day.
+        Time is that of the file; in NMEA logs seconds since 1970 (UTC) where RMC or ZDA have dates, else from midnight of the first
+        day.
 
     Raises
     ------

@@ -9,6 +9,8 @@ import sys
 from typing import Any
 
 TOO_NEW, NOTHING = 3, 4
+OBJECT = "None"  # SciPy's name of an object, which has none
+PACKED = 1032  # times as much as it is: the most that zlib takes together
 LONGEST_FIELD = 16  # numbers of one field of a record: a vector, a quaternion, a matrix of 4 by 4
 
 
@@ -17,11 +19,11 @@ def main() -> int:
     import io
 
     import numpy as np
-    from scipy.io import loadmat, whosmat
+    from scipy.io import loadmat
 
     path, largest = sys.argv[1], int(sys.argv[2])
     try:
-        size = sum(int(np.prod(shape, dtype=float)) for _, shape, _ in whosmat(path)) * 8
+        size = _size(path)
         if size > largest:
             print(f"its arrays hold {size / 2**30:.3g} GiB", file=sys.stderr)
             return 1
@@ -29,17 +31,39 @@ def main() -> int:
     except NotImplementedError:
         return TOO_NEW
     except Exception as error:  # whatever a damaged file provokes
-        opaque = "'NoneType' object is not iterable" in str(error)  # SciPy's, of a shape that an object does not have
-        print("or it holds an object, such as a port: save the arrays alone" if opaque else error, file=sys.stderr)
+        print(error, file=sys.stderr)
         return 1
-    arrays = _flat({name: value for name, value in content.items() if not name.startswith("__")})
-    if not arrays:
-        print(", ".join(f"{name} ({kind})" for name, _, kind in whosmat(path)) or "nothing", file=sys.stderr)
+    own = {name: value for name, value in content.items() if not name.startswith("__") and name != OBJECT}
+    if not (arrays := _flat(own)):
+        print(", ".join(f"{name} ({kind})" for name, kind in _kinds(path, list(own))) or "nothing", file=sys.stderr)
         return NOTHING
     file = io.BytesIO()
     np.savez(file, **arrays)
     sys.stdout.buffer.write(file.getvalue())
     return 0
+
+
+def _size(path: str) -> int:
+    """Bytes of the arrays; of a file with an object, such as a port, whose shape SciPy does not know, what it may hold unpacked."""
+    import os
+
+    import numpy as np
+    from scipy.io import whosmat
+
+    try:
+        return sum(int(np.prod(shape, dtype=float)) for _, shape, _ in whosmat(path)) * 8
+    except TypeError:
+        return os.path.getsize(path) * PACKED
+
+
+def _kinds(path: str, names: list[str]) -> list[tuple[str, str]]:
+    """The variables and MATLAB's words for what they are."""
+    from scipy.io import whosmat
+
+    try:
+        return [(name, kind) for name, _, kind in whosmat(path)]
+    except TypeError:
+        return [*((name, "no numbers") for name in names), ("one more", "object")]
 
 
 def _flat(content: dict[str, Any]) -> dict[str, Any]:

@@ -47,6 +47,9 @@ BEFORE_CLOCK = re.compile(  # at the beginning: a prefix that is a word, and the
     r"^(?:(?:imu|ins|sensors?|raw|body|data|device|output|inertial|combined|mems|fog|rlg|main|primary|scaled|"
     r"shimmer(?:_(?=\w*\d)[0-9a-f]{1,4}(?=_)(?:_[a-f]{1,3}(?=_))?)?)\d*_)+"
 )
+WHOLE_CLOCKS = {  # of Arduino, of AndroSensor, of recorders of sensors
+    "millis": "ms", "micros": "us", "time_since_start_in_ms": "ms", "milliseconds": "ms"
+}  # fmt: skip
 TENTH_MS = ("sampletimefine", "sample_time_fine")  # of Xsens: counts of .1 ms
 
 
@@ -70,9 +73,9 @@ def plain(text: str) -> str:
 def heading_of(name: str) -> Heading | None:
     """What a heading means; None where it is no sensor's of an IMU."""
     bare, unit = split(name)
-    match = re.fullmatch(r"(.*?)\s*\[([0-5])\]", name.strip())  # a column of an array
+    match = re.fullmatch(r"(.*?)\s*\[([0-5])\]", bare.strip())  # a column of an array: ``gyroADC[0] (deg/s)``
     if match is not None:
-        bare, unit = f"{match[1]}_{'xyz'[int(match[2]) % 3]}", None
+        bare = f"{match[1]}_{'xyz'[int(match[2]) % 3]}"
         if int(match[2]) > 2:
             return None
     words = plain(bare)
@@ -131,8 +134,8 @@ def clock_of(name: str) -> tuple[bool, str | None]:
     words = BEHIND.sub("", plain(bare))
     if words in TENTH_MS:
         return True, "0.1 ms"
-    if words in ("millis", "micros"):  # of Arduino
-        return True, "ms" if words == "millis" else "us"
+    if words in WHOLE_CLOCKS:
+        return True, WHOLE_CLOCKS[words]
     match = CLOCK.fullmatch(words) or CLOCK.fullmatch(BEFORE_CLOCK.sub("", words, count=1))
     said = unit_in(unit) if unit else None
     other = said is not None and parse_unit(said)[1] != DIMENSIONS["time"][0]
@@ -149,7 +152,7 @@ def clock_of(name: str) -> tuple[bool, str | None]:
 def is_plain_clock(name: str) -> bool:
     """Whether a heading is a clock's without a word before it."""
     words = BEHIND.sub("", plain(split(name)[0]))
-    return words in (*TENTH_MS, "millis", "micros") or CLOCK.fullmatch(words) is not None
+    return words in (*TENTH_MS, *WHOLE_CLOCKS) or CLOCK.fullmatch(words) is not None
 
 
 def says_rates(names: Sequence[str]) -> bool:

@@ -1,9 +1,9 @@
-"""NMEA 0183 of any talker: GGA (position), RMC (position, speed, course, date), VTG (speed, course), HDT and THS (true heading)."""
+"""NMEA 0183 of any talker: GGA (position), RMC (position, speed, course), VTG (speed, course), HDT and THS (true heading), ZDA."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from truenorth.core.errors import DataError
+from truenorth.formats.nmea_dates import midnight_of, midnights
 from truenorth.formats.order import put_in_order
 from truenorth.records import GnssRecord
 
 NMEA_SUFFIXES = (".nmea", ".nma")
 KNOT = 1852.0 / 3600.0
-DAY = 86400.0
 HEAD = 4096
-KINDS = (b"GGA", b"RMC", b"VTG", b"HDT", b"THS")
+KINDS = (b"GGA", b"RMC", b"VTG", b"HDT", b"THS", b"ZDA")
+TIMED = ("GGA", "RMC", "ZDA")
+DIGITS = {"GGA": {1: 6, 2: 4, 4: 5}, "RMC": {1: 6, 3: 4, 5: 5, 9: 6}, "ZDA": {1: 6, 2: 2, 3: 2}}  # before the point
 HEADINGS = ("HDT", "THS")  # true ones, without a time of their own
 
 
@@ -34,8 +36,9 @@ def read_nmea(path: Path) -> GnssRecord:
 
     Sentences of one epoch make one row: position, height above the ellipsoid (height above the geoid plus the geoid's), quality
     and HDOP from GGA, velocity from RMC (or from the VTG that follows), heading from HDT or THS: of the epoch whose sentences stand
-    before it, or after it where the log begins with a heading. Of several in an epoch the first is taken. Time is in
-    seconds from midnight UTC of the first day.
+    before it, or after it where the log begins with a heading. Of several in an epoch the first is taken. Time is UTC as the
+    receiver stamps it: seconds since 1970 where RMC or ZDA have dates (:mod:`truenorth.formats.nmea_dates`), else from midnight of
+    the first day.
 
     Raises
     ------
@@ -44,11 +47,16 @@ def read_nmea(path: Path) -> GnssRecord:
     """
     rows: dict[float, dict[str, float]] = {}
     lines: dict[float, int] = {}
-    time, day, clock = math.nan, 0.0, math.nan
+    time = math.nan
+    sentences = list(_sentences(path))
+    stamps = iter(_stamps(sentences, path.name))
     ahead: float | None = None  # a heading whose epoch follows
     leads: bool | None = None  # whether headings stand before the sentences of their epoch
-    for number, kind, cells in _sentences(path):
-        where = f"{path.name}: line {number}, {kind}"
+    for number, kind, body in sentences:
+        cells, where = body.split(","), f"{path.name}: line {number}, {kind}"
+        if kind == "ZDA":
+            time = next(stamps) if cells[1] else time
+            continue
         if kind in HEADINGS:
             heading = _heading(cells, where)
             leads = True if leads is None else leads
@@ -65,13 +73,7 @@ def read_nmea(path: Path) -> GnssRecord:
         if not cells[1]:  # before its first fix a receiver does not know the time
             time = math.nan
             continue
-        now = _clock(cells[1], where)
-        if now < clock - DAY / 2:
-            day += DAY
-        elif now > clock + DAY / 2:  # of the day before, late
-            day -= DAY
-        clock = now
-        time = day + now
+        time = next(stamps)
         row = rows.setdefault(time, {})
         lines.setdefault(time, number)
         if ahead is not None:
@@ -119,33 +121,66 @@ def _record(rows: dict[float, dict[str, float]], lines: list[int], source: str) 
     )
 
 
-def _sentences(path: Path) -> Iterator[tuple[int, str, list[str]]]:
+def _stamps(sentences: Sequence[tuple[int, str, str]], source: str) -> list[float]:
+    """Time of each sentence that has one, s; dates are those of RMC with a fix, or else of ZDA."""
+    clock: list[float] = []
+    dates: dict[str, list[float]] = {"RMC": [], "ZDA": []}
+    for number, kind, body in sentences:
+        cells, where = body.split(","), f"{source}: line {number}, {kind}"
+        if kind not in TIMED or not cells[1]:
+            continue
+        clock.append(_clock(cells[1], where))
+        good = kind == "ZDA" or cells[2] == "A"  # before its first fix a receiver may think that it is 1980
+        for name, known in dates.items():
+            known.append(midnight_of(kind, cells, where) if name == kind and good else math.nan)
+    if not clock:
+        return []
+    now, by_rmc, by_zda = np.array(clock), *map(np.array, dates.values())
+    return (now + midnights(now, by_rmc if np.isfinite(by_rmc).any() else by_zda)).tolist()
+
+
+def _sentences(path: Path) -> Iterator[tuple[int, str, str]]:
     """Line number, kind and fields of each sentence that is wanted."""
     lines = path.read_bytes().splitlines()
     for number, line in enumerate(lines, 1):
         start = line.find(b"$")
         if start < 0 or line[start + 3 : start + 6] not in KINDS:
             continue
+        kind = line[start + 3 : start + 6].decode()
         body, star, check = line[start + 1 :].partition(b"*")
         end = number in (1, len(lines))
-        if star:
-            found = reduce(lambda a, b: a ^ b, body, 0)
-            if check[:2].upper() != b"%02X" % found:
-                if end:
-                    continue
-                raise DataError(
-                    f"{path.name}: line {number}: checksum {check[:2].decode(errors='replace')!r}; expected {found:02X}: the "
-                    "sentence is damaged, remove the line"
-                )
-        cells = body.decode("ascii", "replace").split(",")
-        kind = line[start + 3 : start + 6].decode()
-        wanted = {"GGA": 12, "RMC": 9, "VTG": 6, "HDT": 3, "THS": 3}[kind]
+        forms = [_with_zeros(body, kind), body] if check[2:3] == b"," else [body]  # two zeros that are left out cancel
+        fits = [form for form in forms if not star or check[:2].upper() == _checksum(form)]
+        if not fits:
+            if end:
+                continue
+            raise DataError(
+                f"{path.name}: line {number}: checksum {check[:2].decode(errors='replace')!r}; expected "
+                f"{_checksum(body).decode()}: the sentence is damaged, remove the line"
+            )
+        text = fits[0].decode("ascii", "replace")
+        cells = text.split(",")
+        wanted = {"GGA": 12, "RMC": 9, "VTG": 6, "HDT": 3, "THS": 3, "ZDA": 5}[kind]
         if len(cells) >= wanted and cells[0][2:] == kind:
-            yield number, kind, cells
+            yield number, kind, text
         elif not end:
             raise DataError(
                 f"{path.name}: line {number}: {len(cells)} fields; expected {wanted} of {kind}: the sentence is cut short"
             )
+
+
+def _checksum(body: bytes) -> bytes:
+    return b"%02X" % reduce(lambda a, b: a ^ b, body, 0)
+
+
+def _with_zeros(body: bytes, kind: str) -> bytes:
+    """A sentence that a spreadsheet saved, which fills up its lines with commas, and leaves out the zeros of ``050420``."""
+    cells = body.split(b",")
+    for at, digits in DIGITS.get(kind, {}).items():
+        if at < len(cells) and cells[at]:
+            whole, point, rest = cells[at].partition(b".")
+            cells[at] = whole.rjust(digits, b"0") + point + rest
+    return b",".join(cells)
 
 
 def _number(text: str, where: str, what: str) -> float:

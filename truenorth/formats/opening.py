@@ -26,13 +26,15 @@ def columns_of(path: Path, format: str, named: bool = True, part: str = "imu") -
         A damaged file, or one without a table.
     """
     if format in ("csv", "kf-gins", "psins"):
-        from truenorth.formats import vbo
+        from truenorth.formats import json_rows, vbo
         from truenorth.formats.labelled import NOTE
         from truenorth.formats.long_shape import shape_for
         from truenorth.formats.text import open_table
 
         if vbo.is_one(path):
             return vbo.columns(path)
+        if json_rows.is_one(path):
+            return json_rows.columns(path)
         if (shape := shape_for(path, part)) is not None:
             from truenorth.formats import long_table
 

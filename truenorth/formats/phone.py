@@ -23,11 +23,18 @@ from truenorth.formats.quantities import Found, Quantity
 
 Array = NDArray[np.float64]
 
+DEGREES = ("°", "deg")  # what phyphox writes over metres: ``Vertical Accuracy (°)``
 PHONE = (
     Quantity("ground_velocity", "speed", "m/s", ("location_speed", "velocity")),
     Quantity("bearing", "angle", "deg", ("direction", "location_orientation")),
-    Quantity("accuracy", "length", "m", ("horizontal_accuracy", "horizontalaccuracy", "location_accuracy")),
-    Quantity("vertical_accuracy", "length", "m", ("verticalaccuracy",)),
+    Quantity(
+        "accuracy",
+        "length",
+        "m",
+        ("horizontal_accuracy", "horizontalaccuracy", "location_accuracy"),
+        miswritten=DEGREES,
+    ),
+    Quantity("vertical_accuracy", "length", "m", ("verticalaccuracy",), miswritten=DEGREES),
     Quantity("speed_accuracy", "speed", "m/s", ("speedaccuracy",)),
     Quantity("bearing_accuracy", "angle", "deg", ("bearingaccuracy",)),
 )

@@ -52,6 +52,8 @@ class Quantity:
     group: str = ""  # by which `units` may name it along with others, such as ``velocity``
     # names that mean it where no heading means anything else, in a unit of its dimension: ``odo (m/s)`` is a speed
     otherwise: tuple[str, ...] = ()
+    # units of another dimension that an app writes by mistake over numbers in `unit`
+    miswritten: tuple[str, ...] = ()
 
 
 Meaning = tuple[Quantity, float, str | None]  # a quantity, its sign, and the unit that the heading names
@@ -196,6 +198,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options, rec
     if receiver and len(devices := _receivers(columns.names)) > 1:
         taken = [device for device in devices if any(_path(label)[0] == device for label in labels.values())]
         source += f", {' and '.join(taken)} of {', '.join(devices)}" if taken else ""
+    source += _mistaken_units(labels, quantities, options)
     factors = {ours: claim[0][1] for ours, claim in claims.items()}
     time, said = columns.clock(labels["time"])
     if said is None and "time" not in stated and factors["time"] == 1.0 and (face := clock_face(time)) is not None:
@@ -362,9 +365,21 @@ def _key(name: str) -> str:
 
 
 def _unit(quantity: Quantity, stated: str | None, options: Options) -> str | None:
-    """The unit that the caller says, or else the heading; None: neither does."""
-    written = None if stated is None else unit_in(stated) or stated
+    """The unit that the caller says, or else the heading; None: neither does, or the heading's is an app's mistake."""
+    written = None if stated is None or stated in quantity.miswritten else unit_in(stated) or stated
     return options.units.get(quantity.name, options.units.get(quantity.group)) or written
+
+
+def _mistaken_units(labels: Mapping[str, str], quantities: Sequence[Quantity], options: Options) -> str:
+    """What to say of headings whose unit is an app's mistake, and is not taken."""
+    wrong = {
+        labels[quantity.name]: quantity.unit
+        for quantity in quantities
+        if quantity.name in labels
+        and split(labels[quantity.name])[1] in quantity.miswritten
+        and not options.units.keys() & {quantity.name, quantity.group}
+    }
+    return "".join(f", {label} in {unit}" for label, unit in wrong.items())
 
 
 def _factor(quantity: Quantity, stated: str | None, label: str, options: Options, source: str) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,12 +48,4 @@ def without_repeats(
     keep = np.flatnonzero(np.concatenate([[True], ~same]))
     first = columns.place(int(np.argmax(same)) + 1)
     note = f"rows that repeat the row before, with its time, left out: {int(same.sum())}, the first is {first}"
-    left = replace(
-        columns,
-        read=lambda names, gaps: columns.read(names, gaps)[keep],
-        column=lambda name: columns.column(name).take(keep),
-        place=lambda row: columns.place(int(keep[row])),
-        whole={},
-        notes=(*columns.notes, note),
-    )
-    return left, keep
+    return columns.rows_of(keep, note), keep

@@ -26,6 +26,7 @@ from truenorth.formats.behaviour import (
     is_usual,
     size,
 )
+from truenorth.formats.blank_rows import without_blank_rows
 from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.choice import choose
 from truenorth.formats.chosen import Choice
@@ -33,6 +34,7 @@ from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
 from truenorth.formats.counts import counts_above, device_above, orientation_above
 from truenorth.formats.guesses import UnsureError, in_words, take
+from truenorth.formats.gyro_step import by_step
 from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.formats.names import heading_of, plain
 from truenorth.formats.repeats import without_repeats
@@ -80,7 +82,7 @@ def _record_of(columns: Columns, layout: Layout) -> ImuRecord:
     source, columns = columns.path.name, with_angles(columns)
     choice = choose(columns, layout)
     guesses = choice.guesses
-    gyro, accel = _sensors(columns, layout, choice)
+    columns, (gyro, accel) = without_blank_rows(columns, choice.labels[1:], lambda log: _sensors(log, layout, choice))
     if choice.doubt is not None:
         raise choice.doubt
     columns, kept = without_repeats(columns, choice, gyro, accel)
@@ -224,7 +226,7 @@ def _units(
         if known is not None and not _contradicts(facts, known[0]):
             guesses.append(Guess("unit of the gyros", known[0], known[1], 1.0, {"units": {"gyro": known[0]}}))
             return kind, {**said, "gyro": known[0]}
-        readings = gyro_readings(facts, kind, said["accel"])
+        readings = by_step(gyro_readings(facts, kind, said["accel"]), gyro, kind)
         if not readings:
             raise DataError(
                 f"{source}: the gyros' values are those of a gyro in no usual unit; say the unit, or check that these are the gyros"
@@ -297,7 +299,7 @@ def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str
         return
     if not accel_readings(gravity_level(accel), float(np.median(np.diff(time))), (kind,), (force,)):
         return  # what is no gravity in SI, the checks of plausibility name
-    readings = gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force)
+    readings = by_step(gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force), gyro, kind)
     if readings and readings[0].unit != unit:
         best = readings[0]
         claim = next((r.why for r in readings if r.unit == unit), f"in {unit} they cannot be a gyro's")

@@ -70,7 +70,8 @@ def by_behaviour(columns: Columns, layout: Layout, given: Mapping[str, list[str]
         blocks = [*(blocks if "accel" in known else forces), *known.values()]
     from truenorth.formats.sensor_folder import hint
 
-    if longest >= 3 and forces and len(blocks) < 2:
+    gyros = bool(forces) and any("gyr" in plain(name) for name in forces[0])  # counts of theirs with an offset
+    if longest >= 3 and forces and len(blocks) < 2 and not gyros:
         raise DataError(
             f"{source}: columns {' '.join(forces[0])} show gravity, and no other three may be gyros among "
             f"{listed(whole.names)}; expected rates about three axes next to specific forces: name the columns of the gyros"

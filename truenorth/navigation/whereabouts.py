@@ -15,6 +15,7 @@ from truenorth.core.errors import DataError
 from truenorth.core.position import Position
 from truenorth.navigation.given import record_of
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord
+from truenorth.records.overlap import no_overlap
 from truenorth.state.layout import DP
 from truenorth.state.state import Start
 
@@ -32,10 +33,9 @@ def check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
     for sensor in aiding:
         inside = (sensor.time > record.time[0] - record.interval) & (sensor.time <= record.time[-1])
         if not inside.any():
-            raise DataError(
-                f"{sensor.name}: runs from {sensor.time.min():.3f} s to {sensor.time.max():.3f} s, the navigated part of "
-                f"{record.source} from {record.time[0] - record.interval:.3f} s to {record.time[-1]:.3f} s: no overlap; "
-                "expected one clock: shift the aiding log onto the IMU's (`record.shifted`)"
+            navigated = float(record.time[0] - record.interval), float(record.time[-1])
+            raise no_overlap(
+                sensor.name, (float(sensor.time.min()), float(sensor.time.max())), record.source, navigated
             )
 
 
