@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from truenorth import DataError, Gnss, Odometer, align
+from truenorth.cli.aiding_options import on_its_day
 from truenorth.core.position import Position
 from truenorth.records import GnssRecord, OdometerRecord
 from truenorth.records.overlap import DAY, HOUR, LEAP, ROLLED, WEEK, shift_of
@@ -65,3 +66,14 @@ def test_wheels_of_another_clock(drive, by):
     wheel = OdometerRecord(gnss.time + by, np.full(len(gnss), 4.0), "distance")
     with pytest.raises(DataError, match=r"no overlap; expected one clock"):
         align(record, (50.0, 10.0, 100.0), "tactical", aid=Odometer(wheel))
+
+
+def test_a_clock_of_the_day_and_one_with_dates_are_brought_together(drive):
+    """NMEA has dates, many a logger the time of day alone: whole days are no question."""
+    record, gnss = drive
+    (aid,) = on_its_day(record, [Gnss(gnss.shifted(SATURDAY))])
+    np.testing.assert_allclose(aid.record.time, gnss.time, rtol=0.0, atol=1e-6)
+    assert f"{-SATURDAY / DAY:.0f} days" in aid.record.source
+    for other in (gnss, gnss.shifted(SATURDAY + 3.5 * HOUR)):
+        aid = Gnss(other)
+        assert on_its_day(record, [aid]) == [aid]

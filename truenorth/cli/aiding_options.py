@@ -28,6 +28,8 @@ from truenorth.cli.reading import numbers_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from truenorth.records import ImuRecord
+
 GYROS = "gyros"
 
 IndexerAxes = Annotated[str, option("Axes of the indexer, the outermost first."), Sets("indexer", axes)]
@@ -86,6 +88,26 @@ def shifted(aids: Sequence[Any], offset: str | None, others: Sequence[str] = ())
                 raise UsageError(f"--offset {offset}: {key} is {wrong}; expected, once each, of: {', '.join(clocks)}")
             late[key] = number
     return [replace(aid, record=aid.record.shifted(late[aid.key])) if aid.key in late else aid for aid in aids]
+
+
+def on_its_day(record: ImuRecord, aids: Sequence[Any]) -> list[Any]:
+    """Sensors on the clock of the IMU's log where that counts from midnight and they from 1970, or the other way round.
+
+    Their source says so. It is the one way in which whole days bring both together; others are asked about.
+    """
+    from dataclasses import replace
+
+    from truenorth.records.overlap import DAY, days_apart
+
+    found = []
+    for aid in aids:
+        log = getattr(aid, "record", None)
+        days = 0.0 if log is None else days_apart((log.time[0], log.time[-1]), (record.time[0], record.time[-1]))
+        if log is not None and days:
+            said = f"{log.source} ({days / DAY:+.0f} days: one of both logs counts from midnight)"
+            aid = replace(aid, record=replace(log.shifted(days), source=said))
+        found.append(aid)
+    return found
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from truenorth.cli.ahead import compile_ahead
-from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable, shifted
+from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable, on_its_day, shifted
 from truenorth.cli.align_options import check_options
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import make_console, stages
@@ -114,13 +114,14 @@ def align(
                 "consumer or a YAML file"
             )
         found = shifted(moving.aids() if master.master is None else [], moving.offset, pointing.keys)
+        found = on_its_day(record, found)
         directions: list[Any] = []
         if pointing.named:
             directions = pointing.aids(record, place or _first_place(record, found))
         aids: list[Any] = [
             *master.aids(indexer, moving),
             *found,
-            *shifted(directions, moving.offset, [aid.key for aid in found]),
+            *on_its_day(record, shifted(directions, moving.offset, [aid.key for aid in found])),
             *table.aids(),
             *indexer.aids(),
         ]

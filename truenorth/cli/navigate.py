@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from truenorth.cli.aiding_options import shifted
+from truenorth.cli.aiding_options import on_its_day, shifted
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import in_reader_s_words, make_console, print_written, stages
 from truenorth.cli.fields import Sets, given, plain
@@ -242,7 +242,7 @@ def navigate(
         result = navigate_record(
             record,
             begin if known.heading is not None or start is None else start,
-            aid=shifted([*sensors.aids(begin), *pointing.aids(record, place)], sensors.offset),
+            aid=on_its_day(record, shifted([*sensors.aids(begin), *pointing.aids(record, place)], sensors.offset)),
             altitude=altitude,  # type: ignore[arg-type]  # checked there, with the choices in the message
             zupt=stops,
             smooth=smooth,

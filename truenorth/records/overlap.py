@@ -45,6 +45,13 @@ def shift_of(of_aid: Span, of_log: Span) -> float | None:
     return None
 
 
+def days_apart(of_aid: Span, of_log: Span) -> float:
+    """What to add to the times of an aid, s, where one of two clocks counts from 1970 and the other from midnight; else 0."""
+    dated = of_aid[0] > DATED, of_log[0] > DATED
+    shift = shift_of(of_aid, of_log) if dated[0] != dated[1] else None
+    return shift if shift is not None and shift % DAY == 0.0 else 0.0
+
+
 def _shifts(aid: float, log: float) -> Iterator[float]:
     """Whole days to a clock of the day, weeks to one of the GPS week, and what two clocks with dates may be apart by."""
     if (aid > DATED) != (log > DATED):
