@@ -272,7 +272,7 @@ def moving_task(
     stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)
-        stops += updates_at(record, still, disturbed, velocity_at_rest(disturbed, odometer, gnss))
+        stops += updates_at(record, still, disturbed, velocity_at_rest(disturbed, odometer, gnss), odometer)
     return MovingTask(
         record,
         spec,

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment
-from truenorth.core.attitude import euler_from_dcm
 from truenorth.quality.regimes import motion_summary
 from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
@@ -61,13 +60,17 @@ def turn_since_first_row(record: ImuRecord, answer: Alignment) -> tuple[float, f
 
 
 def _headings(record: ImuRecord, answer: Alignment) -> tuple[Array, Array]:
-    """Times, s, and heading there, rad, as the gyros have it less the bias that is known; right at the last but for its error."""
+    """Times, s, and by how much heading is off the last there, rad, as the gyros turn about the vertical less the known bias.
+
+    Of the whole turn, not of Euler's angle, which an IMU that stands on its forward axis does not have.
+    """
     duration = float(record.time[-1] - record.time[0])
     seen = integrate(record, min(1.0, duration / POINTS), answer.gyro_bias, rows_at=[len(record) - 1])
     C_ib = np.concatenate([seen.C_ib, seen.C_ib_at])
     time = np.append(seen.time, record.time[-1] - seen.start)
     C_nb = earth_rotation(time[-1] - time, answer.position.lat) @ answer.C_nb @ C_ib[-1].T @ C_ib
-    return time, np.unwrap(euler_from_dcm(C_nb)[0])
+    turn = C_nb @ answer.C_nb.T
+    return time, -np.unwrap(np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1]))
 
 
 def _drift(time: Array, heading: Array) -> tuple[float, float]:

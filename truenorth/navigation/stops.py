@@ -31,7 +31,6 @@ BIAS_CHANGE = math.radians(
 FEWEST_FIXES = 5  # through which a line is laid
 REACHES = (2.0, 5.0, 10.0, 20.0)  # s before and after a fix
 SHARP = 0.4  # of the speed of standing: one sigma of a slope that is sharp enough
-CREEPING = STILL_VELOCITY  # over a second, by a wheel: no more is standing
 STANDING_PULSES = 1.5  # pulses of an odometer in a second: no more is standing
 LEAST_ANGLE = 1e-9  # rad: of a simulated IMU that nothing shakes
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
@@ -185,34 +184,34 @@ def velocity_at_rest(at: Array, *logs: OdometerRecord | GnssRecord | VelocityRec
     return math.sqrt(found)
 
 
+def creeping(at: Array, wheel: OdometerRecord | VelocityRecord | None) -> Array:
+    """(m,) speed that a wheel has in the seconds around these times, m/s; zero where it has no rows.
+
+    A paver goes at 6 cm/s, as smooth as at rest; a car's wheels may show as much where it stands. No zero velocity is known better.
+    """
+    if not isinstance(wheel, OdometerRecord):
+        return np.zeros(len(at))
+    way, span = (np.concatenate([[0.0], np.cumsum(x)]) for x in (wheel.speed * wheel.steps, wheel.steps))
+    first, last = (np.searchsorted(wheel.time, at + half, "right") for half in (-0.5, 0.5))
+    return np.asarray(np.abs(way[last] - way[first]) / np.maximum(span[last] - span[first], 1e-9))
+
+
 def _speed_of(log: OdometerRecord | GnssRecord | VelocityRecord) -> tuple[Array, NDArray[np.bool_]]:
     """When a sensor gave a speed, and whether it was motion."""
     if isinstance(log, OdometerRecord):
-        return _speed_of_wheel(log)
+        time = log.time - 0.5 * log.steps
+        if log.pulse_size is None:
+            return time, np.abs(log.speed) > STANDING
+        # One pulse in a row of .1 s would be a speed, and none may be a creeping vehicle: pulses count over a second.
+        way = np.concatenate([[0.0], np.cumsum(log.values)]) * log.pulse_size
+        first, last = (np.searchsorted(log.time, time + half, "right") for half in (-0.5, 0.5))
+        return time, np.abs(way[last] - way[first]) > max(STANDING, STANDING_PULSES * log.pulse_size)
     velocity = log.v_n if isinstance(log, GnssRecord) else log.velocity
     if velocity is None or not np.isfinite(velocity[:, :2]).any():
         return _speed_of_places(log) if isinstance(log, GnssRecord) else (np.empty(0), np.empty(0, dtype=bool))
     level = velocity[:, :2]
     said = np.isfinite(level).any(axis=1)
     return log.time[said], np.linalg.norm(np.nan_to_num(level[said]), axis=1) > STANDING
-
-
-def _speed_of_wheel(log: OdometerRecord) -> tuple[Array, NDArray[np.bool_]]:
-    """The same of a wheel, over a second: it has no speed of its own, so that a machine that creeps is seen.
-
-    One pulse in a row of .1 s would be a speed, and none may be a creeping vehicle; and a speed is known by its mean.
-    """
-    time = log.time - 0.5 * log.steps
-    way = np.concatenate([[0.0], np.cumsum(log.speed * log.steps)])
-    first, last = (np.searchsorted(log.time, time + half, "right") for half in (-0.5, 0.5))
-    way_of = np.abs(way[last] - way[first])
-    if log.pulse_size is not None:
-        return time, way_of > max(CREEPING, STANDING_PULSES * log.pulse_size)
-    # Second differences of white noise have six times its variance.
-    noise = float(np.median(np.abs(np.diff(log.speed, n=2)))) / 0.6745 / math.sqrt(6.0) if len(time) > 2 else 0.0
-    span = np.maximum(time[last - 1] - time[np.minimum(first, last - 1)] + log.steps[last - 1], log.steps)
-    seen = np.maximum(CREEPING, BEYOND * noise / np.sqrt(np.maximum(last - first, 1)))
-    return time, way_of > np.minimum(seen, STANDING) * span
 
 
 def _speed_of_places(log: GnssRecord) -> tuple[Array, NDArray[np.bool_]]:
@@ -309,7 +308,7 @@ def zero_updates(
         seen = stops_in(record)[0]
         still = seen[_inside(seen, stops)]
         disturbed = given[_near(given, still, 0.5) == 0]
-    return updates_at(record, still, disturbed, shaken)
+    return updates_at(record, still, disturbed, shaken, odometer)
 
 
 def _inside(at: Array, stops: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
@@ -318,16 +317,23 @@ def _inside(at: Array, stops: Sequence[tuple[float, float]]) -> NDArray[np.bool_
     return np.any(inside, axis=0) if inside else np.zeros(len(at), dtype=np.bool_)
 
 
-def updates_at(record: ImuRecord, still: Array, disturbed: Array, shaken: float = DISTURBED_VELOCITY) -> list[Aiding]:
+def updates_at(
+    record: ImuRecord,
+    still: Array,
+    disturbed: Array,
+    shaken: float = DISTURBED_VELOCITY,
+    wheel: OdometerRecord | VelocityRecord | None = None,
+) -> list[Aiding]:
     """Zero velocities in the seconds around these times, and zero rotations where nothing moves at all.
 
-    `shaken` is the one-sigma velocity of the disturbed ones, m/s.
+    `shaken` is the one-sigma velocity of the disturbed ones, m/s; a second in which the wheel goes may have its speed.
     """
     drawn = uneven(still)
     time = np.concatenate([drawn, disturbed])
     if time.size == 0:
         return []
     sigma = np.concatenate([np.full(still.size, STILL_VELOCITY), np.full(disturbed.size, shaken)])
+    sigma = np.maximum(sigma, creeping(np.concatenate([still, disturbed]), wheel))
     zero = np.zeros((time.size, 3))
     found = [Aiding("zero velocity", "velocity", time, zero, np.tile(sigma[:, None], 3))]
     if still.size:
