@@ -4,12 +4,11 @@ Of velocity, fixes say what they say of the way in some ten seconds to minutes. 
 less than ``2 pi T``, a random walk of the density ``s sqrt(2 / T)``: a smoother follows it, and as of white fixes it says that the
 velocity so found is right. A filter knows velocity by the last seconds alone, and hardly suffers.
 
-The test for colour (:mod:`truenorth.quality.slow_aids`) asks for a share of the noise: of fixes each second it takes a slow error
-that is three quarters as large as the white noise for white, in half of all drives. The likelihood of the whole log is a sharper
-one. With an IMU that holds its velocity it tells a fifth of the white noise from nothing, and no less: that much may be hidden of
-white fixes, too. So no decision is made. All sizes up to the most that the test for colour leaves are alike likely beforehand, and
-the log is smoothed once more with the mean of ``s^2`` by the likelihood of each. White noise is what differences of innovations
-show; the time is the usual one, since of another one it is ``s^2 / T`` that counts.
+The test for colour (:mod:`truenorth.quality.slow_aids`) asks for a share of what is left in innovations. In logs of 200 s with
+fixes each second it found no slow error up to nine tenths of the white noise. The likelihood of the whole log is a sharper one,
+and still a tenth to a third of the white noise may be hidden of white fixes. So no decision is made. All sizes up to the last of
+`SIZES` are alike likely beforehand, and the log is smoothed once more with the mean of ``s^2`` by the likelihood of each. White
+noise is what differences of innovations show; the time is the usual one, since of another one it is ``s^2 / T`` that counts.
 
 By that, the square of the answer's error is the variance of the second smoother and the square of what the two differ by. The
 answer itself is that of white fixes, whose last epoch is the filter's, and it is never less sure than the filter's.
