@@ -45,7 +45,7 @@ def usual(aiding: Iterable[Aiding]) -> dict[str, Lasting]:
 
     Of receivers of whose errors no log has shown how they last.
     """
-    return {s.name: _lasting(s, 1.0, *USUAL[s.name][0][1:]) for s in _unsaid(aiding)}
+    return {s.name: lasting_of(s, 1.0, *USUAL[s.name][0][1:]) for s in _unsaid(aiding)}
 
 
 def fitted(
@@ -74,7 +74,7 @@ def fitted(
         middle[names.index(FIXES), 1], spread[names.index(FIXES), 1] = math.log(seen), math.log(3.0)
 
     def as_said(x: Array) -> dict[str, Lasting]:
-        return {**slow, **{name: _lasting(sources[name], *np.exp(row)) for name, row in zip(names, x, strict=True)}}
+        return {**slow, **{name: lasting_of(sources[name], *np.exp(row)) for name, row in zip(names, x, strict=True)}}
 
     def misfit(x: Array) -> float:
         try:
@@ -141,7 +141,7 @@ def _level(source: Aiding) -> float:
     return float(np.median(source.sigma[:, :2]))
 
 
-def _lasting(source: Aiding, white: float, size: float, time: float) -> Lasting:
+def lasting_of(source: Aiding, white: float, size: float, time: float) -> Lasting:
     """White noise and slow error of a source, in parts of its sigma along the level; heights err more by what it says of them."""
     there = np.isfinite(source.measured[:, : source.row.rows]).any(axis=0)
     axes = np.where(there, np.median(source.sigma, axis=0) / _level(source), LEAST)

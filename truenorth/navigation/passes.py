@@ -17,6 +17,7 @@ from truenorth.estimate.moment import as_unsure, likeliest_moment, quickness, te
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.estimate.other_clocks import best_clock, clock_ratio
 from truenorth.navigation.given import ungated
+from truenorth.navigation.hidden_slow import smoothed_as_unsure
 from truenorth.navigation.plan import Plan
 from truenorth.navigation.second_look import ALL_QUICK, SENSORS, as_found
 from truenorth.navigation.under_way import fitted_under_way
@@ -82,7 +83,7 @@ def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dic
     plan, track, lasting = with_slow_errors(plan, given, track, smooth)
     said += lasting
     receiver = given.get(Gnss.key)
-    track = as_unsure(track.whole(), plan.delay_spread)
+    track = as_unsure(smoothed_as_unsure(plan, given, track) if smooth else track, plan.delay_spread)
     if isinstance(receiver, Gnss):
         said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
         fixes = next((source for source in plan.sources(given) if source.name == FIXES), None)
