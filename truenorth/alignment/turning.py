@@ -22,6 +22,7 @@ from truenorth.alignment.check import BLIND_RATE, LogCheck, force_size
 from truenorth.alignment.fine import ARM_PRIOR, MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import infer_spec
 from truenorth.alignment.matched import innovations_of
+from truenorth.alignment.setting_off import UNKNOWN, fits_a_table, sets_off
 from truenorth.alignment.swaying import farthest
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.alignment.usual import usual
@@ -68,6 +69,7 @@ class TurningAlignment(FineAlignment):
 
     scatter: float  # rad^2; of each axis of level, over the passes
     held: Array  # (n,): see :class:`_Held`
+    left: float | None = None  # s, on the record's clock; from which on the base goes away, and only the gyros are used
 
     @property
     def end(self) -> Array:
@@ -183,9 +185,19 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
     rows_at : (M,) int array
         Rows after which the integrated attitude is wanted.
     """
+    sways = task.motion.overall == "swaying" or rocks_all_along(task.motion)
+    off = None if sways else sets_off(task.record)
+    if off is not None:
+        rest = _fitted(task, spec, rows_at, sways, off.time)
+        if not fits_a_table(rest, off):
+            return rest
+    return _fitted(task, spec, rows_at, sways, None)
+
+
+def _fitted(task: Task, spec: ImuSpec, rows_at: Array, sways: bool, left: float | None) -> TurningAlignment:
+    """:func:`turning_align`, of a base that goes away from a time (s) on."""
     record, lat, alt = task.record, task.position.lat, task.position.alt
     rate = EARTH_RATE * math.cos(lat)
-    sways = task.motion.overall == "swaying" or rocks_all_along(task.motion)
     arm = ARM_PRIOR if sways else TURN_ARM
     # A boat at anchor swings about another point than the one about which waves roll her.
     slow_arm = ARM_PRIOR if sways else 0.0
@@ -216,9 +228,9 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
             sways=sways,
             taken=taken,
         )
-        R = white_variance(mean_velocity(log.integrals, C, lat, alt))
-        everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
-        noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
+        stays = log.integrals.start + log.integrals.time[1:] <= (math.inf if left is None else left)
+        R = white_variance(mean_velocity(log.integrals, C, lat, alt)[stays])
+        noise = VelocityNoise(np.where(stays[:, None], R, UNKNOWN**2), [stays], MAX_NOISE_PASSES)
         passes = _Passes(log, noise)
         last = settle(log, partial(_by_level, log, noise), passes.moved, most=LAST if whole else ROUND)
         best = passes.best(at_rest=last.moved < CONVERGED)
@@ -226,7 +238,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
         if whole:
             last = Settled(best.found, last.passes, best.moved)
             scatter, disturbance = passes.scatter(best), np.sqrt(best.R)
-            found = TurningAlignment.of(log, last, prior.sensors, disturbance, scatter=scatter, held=end)
+            found = TurningAlignment.of(log, last, prior.sensors, disturbance, scatter=scatter, held=end, left=left)
             return replace(found, settled=best.moved < limit("bound"))
         log.correct(end)
         C, taken, length = log.C_n0_i, log.taken, 2.0 * length

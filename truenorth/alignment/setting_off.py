@@ -1,0 +1,111 @@
+"""A base that rests, and turns at the end of its log: a table that goes on turning, or a vehicle that sets off.
+
+Both begin alike. A table turns its IMU about an axis: an arm, scale factors and misalignments explain what the accelerometers see,
+and the turn shows their biases. A vehicle turns as it is pushed, and nothing of the sensors explains the push; fitted all the same,
+it made an accelerometer's bias of 37 mg, and a level that was 32 sigmas off. One has to see the base rest again, or turn for some
+seconds, to tell the two apart. So the seconds from where the base sets off are left out of the fit, the gyros carry the attitude
+through them, and they are asked whether they fit what the rest has shown: where they do, the base is a table.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.matched import whitened
+from truenorth.analysis.chi_square import chi_square_limit
+from truenorth.filters import Estimates, kalman
+from truenorth.navigation.departure import departure
+from truenorth.quality.regimes import KINDS, SEEN_LATE, TURN_RATE, MotionSummary, motion_summary
+from truenorth.quality.signals import median_of_rows
+from truenorth.records import ImuRecord
+from truenorth.state.evidence import Evidence, contradiction
+
+Array = NDArray[np.float64]
+
+AGAIN = 5  # s of rest that show where a turn has led to
+EDGE = 1.0  # s before a turn is seen, in which it begins
+SOONER = 30.0  # s, at the most, by which a push begins before the turn
+RESTS = 60.0  # s before that, from which a departure is told
+AT_REST = 5.0  # s of rest, at least, that show a level
+UNKNOWN = 100.0  # m/s, one sigma: of a base that sets off
+TABLE = 0.01  # m/s: by which a table shakes what it turns
+FEWEST, FIRST = 8, 20  # epochs of a turn that tell a table, and of how many the first are asked
+LAST = 5  # epochs at the end that are held against chance
+BY_CHANCE = 1e-6
+
+
+class SettingOff(NamedTuple):
+    """When a base that rested sets off, and turns till the end of its log; s, on the record's clock."""
+
+    time: float
+    turns: float  # from when on it turns
+
+
+def sets_off(record: ImuRecord) -> SettingOff | None:
+    """When a base that rested sets off; None where it does not, or rests again."""
+    motion = motion_summary(record)
+    # A cheap gyro's bias looks like a turn: what is the rate of most seconds is no setting off.
+    by = np.linalg.norm(motion.rate - median_of_rows(motion.rate.T)[:, 0], axis=1)
+    turns = np.flatnonzero((motion.kind == KINDS.index("rotating")) & (by > TURN_RATE))
+    if not len(turns) or len(motion.kind) - turns[-1] > AGAIN:
+        return None
+    pauses = np.flatnonzero(np.diff(turns) > AGAIN)
+    first = int(turns[pauses[-1] + 1] if len(pauses) else turns[0])
+    seen = float(motion.time[first]) - 1.0
+    begins = float(motion.time[_moves_before(motion, first)]) - 1.0 - EDGE
+    pushed = departure(record.between(begins - SOONER - RESTS, None))
+    if pushed is not None and np.isfinite(pushed.unseen):
+        begins = min(begins, max(pushed.time, begins - SOONER))
+    return SettingOff(begins, seen) if begins > record.time[0] - record.interval + AT_REST else None
+
+
+def _moves_before(motion: MotionSummary, first: int) -> int:
+    """The first second of motion that goes over into a turn, whose first second is given."""
+    moves = motion.kind == KINDS.index("moving")
+    if motion.still_fraction > 0.5:  # else people or an engine shake it
+        moves |= motion.kind == KINDS.index("disturbed")
+    while first > 0 and moves[first - 1]:
+        first -= 1
+    return first
+
+
+def fits_a_table(fine: FineAlignment, off: SettingOff) -> bool:
+    """Whether a fit that leaves a setting off out foretells what follows as of an IMU that a table turns, by the innovations."""
+    time = fine.integrals.start + fine.integrals.time
+    left_out, rows = time[1:] > off.time, np.flatnonzero(time[:-1] >= off.turns)[:FIRST]
+    if len(rows) < FEWEST:
+        return False
+    R = fine.system.R.copy()
+    R[left_out] += np.diag(fine.disturbance**2 + TABLE**2 - UNKNOWN**2)
+    seen = kalman(fine.system.with_arrays(R=R), history="full", innovations=True)
+    return _beyond_chance(seen, rows) is None
+
+
+def end_evidence(fine: FineAlignment) -> list[Evidence]:
+    """That the last epochs of a log in which the IMU turns are not what its fit foretells: then no sigma is to be trusted there.
+
+    A variance of the base's motion that is fitted to the whole log hardly grows by the last few of its seconds.
+    """
+    count = len(fine.estimates.innovation)
+    rows = np.arange(count)[: -LAST - 1 : -1]
+    found = _beyond_chance(fine.estimates, rows)
+    if found is None:
+        return []
+    epochs, nis = found
+    begins = float(fine.integrals.start + fine.integrals.time[count - epochs])
+    factor = math.sqrt(nis / (2.0 * epochs))
+    return [contradiction("innovations.at_end", "end_before", until=begins, factor=factor, end=begins - SEEN_LATE)]
+
+
+def _beyond_chance(seen: Estimates, rows: NDArray[np.int64]) -> tuple[int, float] | None:
+    """Of how many of these epochs, the first ones, level innovations are farthest beyond chance, and their squares; None: none."""
+    L: Array = np.asarray(np.linalg.cholesky(seen.innovation_covariance[rows]), dtype=np.float64)
+    nis = np.cumsum(np.sum(whitened(L, seen.innovation[rows][..., None])[:, :2, 0] ** 2, axis=1))
+    beyond = nis / [chi_square_limit(BY_CHANCE, 2 * (k + 1)) for k in range(len(nis))]
+    worst = int(np.argmax(beyond))
+    return (worst + 1, float(nis[worst])) if beyond[worst] > 1.0 else None
