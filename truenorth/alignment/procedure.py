@@ -35,7 +35,7 @@ from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rivals import rival_evidence
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
-from truenorth.alignment.setting_off import end_evidence
+from truenorth.alignment.setting_off import away_notes, end_evidence
 from truenorth.alignment.signatures import level_step_evidence, what_begins
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
@@ -66,7 +66,7 @@ from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specified import corrected
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.state.evidence import Evidence, note
+from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
 from truenorth.strapdown.inertial import integrate
 
@@ -254,9 +254,7 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     )
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
     way = strays(fine, task.position, used.gyro_random_walk)
-    steps = level_step_evidence(fine, used) + end_evidence(fine)
-    if fine.left is not None:
-        steps.append(note("base.sets_off", time=fine.left))
+    steps = level_step_evidence(fine, used) + end_evidence(fine) + away_notes(fine.away)
     return _Found(answer, unchecked, fine.settled, steps=steps, way=way, moved=_moves_on(task, fine))
 
 

@@ -1,15 +1,18 @@
-"""A base that rests, and turns at the end of its log: a table that goes on turning, or a vehicle that sets off.
+"""A base that rests, and turns at one end of its log: a table that goes on turning, or a vehicle that sets off or stops.
 
 Both begin alike. A table turns its IMU about an axis: an arm, scale factors and misalignments explain what the accelerometers see,
 and the turn shows their biases. A vehicle turns as it is pushed, and nothing of the sensors explains the push; fitted all the same,
 it made an accelerometer's bias of 37 mg, and a level that was 32 sigmas off. One has to see the base rest again, or turn for some
 seconds, to tell the two apart. So the seconds from where the base sets off are left out of the fit, the gyros carry the attitude
-through them, and they are asked whether they fit what the rest has shown: where they do, the base is a table.
+through them, and they are asked whether they fit what the rest has shown: where they do, the base is a table. A log that begins as
+its vehicle stops is the same backwards.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +26,7 @@ from truenorth.navigation.departure import departure
 from truenorth.quality.regimes import KINDS, SEEN_LATE, TURN_RATE, MotionSummary, motion_summary
 from truenorth.quality.signals import median_of_rows
 from truenorth.records import ImuRecord
-from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.evidence import Evidence, contradiction, note
 
 Array = NDArray[np.float64]
 
@@ -39,19 +42,42 @@ LAST = 5  # epochs at the end that are held against chance
 BY_CHANCE = 1e-6
 
 
-class SettingOff(NamedTuple):
-    """When a base that rested sets off, and turns till the end of its log; s, on the record's clock."""
+class Away(NamedTuple):
+    """A part of a log, at one of its ends, in which a base that rests otherwise goes or turns; s, on the record's clock."""
 
-    time: float
-    turns: float  # from when on it turns
+    begin: float
+    end: float
+    first: float  # of its turn, ...
+    last: float  # ... and the last
 
 
-def sets_off(record: ImuRecord) -> SettingOff | None:
-    """When a base that rested sets off; None where it does not, or rests again."""
+def stays_in(edges: Array, away: Sequence[Away]) -> NDArray[np.bool_]:
+    """(K,) whether intervals between edges (K+1,) reach into no part in which the base goes away."""
+    stays = np.ones(len(edges) - 1, dtype=np.bool_)
+    for part in away:
+        stays &= (edges[1:] <= part.begin) | (edges[:-1] >= part.end)
+    return stays
+
+
+def goes_away(record: ImuRecord) -> tuple[Away, ...]:
+    """The end and the beginning of a log, where the base turns in them and rests behind, or before."""
+    begin, end = float(record.time[0] - record.interval), float(record.time[-1])
+    edges = np.append(begin, record.time)
+    back = replace(record, time=begin + end - edges[-2::-1], gyro=-record.gyro[::-1], accel=record.accel[::-1])
+    off, stops = _sets_off(record), _sets_off(back)
+    found = [] if off is None else [Away(off[0], math.inf, off[1], end)]
+    if stops is not None and (off is None or begin + end - stops[0] < off[0] - AT_REST):
+        found.append(Away(-math.inf, begin + end - stops[0], begin, begin + end - stops[1]))
+    return tuple(found)
+
+
+def _sets_off(record: ImuRecord) -> tuple[float, float] | None:
+    """When a base that rested sets off, and from when on it turns till the end; None where it does not, or rests again."""
     motion = motion_summary(record)
-    # A cheap gyro's bias looks like a turn: what is the rate of most seconds is no setting off.
-    by = np.linalg.norm(motion.rate - median_of_rows(motion.rate.T)[:, 0], axis=1)
-    turns = np.flatnonzero((motion.kind == KINDS.index("rotating")) & (by > TURN_RATE))
+    # A cheap gyro's bias looks like a turn: what is the rate of most seconds, or is slower, is no setting off.
+    most = median_of_rows(motion.rate.T)[:, 0]
+    turning = (motion.kind == KINDS.index("rotating")) & (np.linalg.norm(motion.rate, axis=1) > np.linalg.norm(most))
+    turns = np.flatnonzero(turning & (np.linalg.norm(motion.rate - most, axis=1) > TURN_RATE))
     if not len(turns) or len(motion.kind) - turns[-1] > AGAIN:
         return None
     pauses = np.flatnonzero(np.diff(turns) > AGAIN)
@@ -61,7 +87,7 @@ def sets_off(record: ImuRecord) -> SettingOff | None:
     pushed = departure(record.between(begins - SOONER - RESTS, None))
     if pushed is not None and np.isfinite(pushed.unseen):
         begins = min(begins, max(pushed.time, begins - SOONER))
-    return SettingOff(begins, seen) if begins > record.time[0] - record.interval + AT_REST else None
+    return (begins, seen) if begins > record.time[0] - record.interval + AT_REST else None
 
 
 def _moves_before(motion: MotionSummary, first: int) -> int:
@@ -74,14 +100,20 @@ def _moves_before(motion: MotionSummary, first: int) -> int:
     return first
 
 
-def fits_a_table(fine: FineAlignment, off: SettingOff) -> bool:
-    """Whether a fit that leaves a setting off out foretells what follows as of an IMU that a table turns, by the innovations."""
-    time = fine.integrals.start + fine.integrals.time
-    left_out, rows = time[1:] > off.time, np.flatnonzero(time[:-1] >= off.turns)[:FIRST]
-    if len(rows) < FEWEST:
+def fits_a_table(fine: FineAlignment, away: Away) -> bool:
+    """Whether a part left out of a fit is what this foretells as of an IMU that a table turns, by the innovations."""
+    edges = fine.integrals.start + fine.integrals.time
+    turns = np.flatnonzero((edges[:-1] >= away.first) & (edges[1:] <= away.last))
+    if len(turns) < FEWEST:
         return False
+    # What a log begins with its filter believes: the rest behind tells whether it should.
+    rows = (
+        turns[:FIRST]
+        if math.isinf(away.end)
+        else np.arange(len(edges) - 1)[max(turns[-1] - FIRST, 0) : turns[-1] + FIRST]
+    )
     R = fine.system.R.copy()
-    R[left_out] += np.diag(fine.disturbance**2 + TABLE**2 - UNKNOWN**2)
+    R[~stays_in(edges, (away,))] += np.diag(fine.disturbance**2 + TABLE**2 - UNKNOWN**2)
     seen = kalman(fine.system.with_arrays(R=R), history="full", innovations=True)
     return _beyond_chance(seen, rows) is None
 
@@ -100,6 +132,14 @@ def end_evidence(fine: FineAlignment) -> list[Evidence]:
     begins = float(fine.integrals.start + fine.integrals.time[count - epochs])
     factor = math.sqrt(nis / (2.0 * epochs))
     return [contradiction("innovations.at_end", "end_before", until=begins, factor=factor, end=begins - SEEN_LATE)]
+
+
+def away_notes(away: Sequence[Away]) -> list[Evidence]:
+    """Of which part of its log an answer is."""
+    return [
+        note("base.sets_off", time=part.begin) if math.isinf(part.end) else note("base.stops", time=part.end)
+        for part in away
+    ]
 
 
 def _beyond_chance(seen: Estimates, rows: NDArray[np.int64]) -> tuple[int, float] | None:

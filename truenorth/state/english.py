@@ -71,6 +71,7 @@ SENTENCES = {
     "base.sets_off": (
         "the base turns and goes away from about {time:.0f} s on: level is that of the rest before, carried on by the gyros"
     ),
+    "base.stops": "the base moves until about {time:.0f} s: level is that of the rest behind",
     "base.stays": (
         "that the base stays is taken as given: a steady {speed:.2g} m/s towards north or south would turn heading by its sigma, "
         "and the log would not show it"
