@@ -75,9 +75,9 @@ def _sets_off(record: ImuRecord) -> tuple[float, float] | None:
     """When a base that rested sets off, and from when on it turns till the end; None where it does not, or rests again."""
     motion = motion_summary(record)
     # A cheap gyro's bias looks like a turn: what is the rate of most seconds, or is slower, is no setting off.
-    most = median_of_rows(motion.rate.T)[:, 0]
-    turning = (motion.kind == KINDS.index("rotating")) & (np.linalg.norm(motion.rate, axis=1) > np.linalg.norm(most))
-    turns = np.flatnonzero(turning & (np.linalg.norm(motion.rate - most, axis=1) > TURN_RATE))
+    most, least = median_of_rows(motion.rate.T)[:, 0], TURN_RATE + 5.0 * float(np.linalg.norm(motion.angle_noise))
+    faster = np.linalg.norm(motion.rate, axis=1) > np.linalg.norm(most)
+    turns = np.flatnonzero(faster & (np.linalg.norm(motion.rate - most, axis=1) > least))
     if not len(turns) or len(motion.kind) - turns[-1] > AGAIN:
         return None
     pauses = np.flatnonzero(np.diff(turns) > AGAIN)
