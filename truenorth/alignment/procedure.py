@@ -35,6 +35,7 @@ from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rivals import rival_evidence
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
+from truenorth.alignment.setting_off import away_notes, end_evidence
 from truenorth.alignment.signatures import level_step_evidence, what_begins
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
@@ -253,7 +254,7 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     )
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
     way = strays(fine, task.position, used.gyro_random_walk)
-    steps = level_step_evidence(fine, used)
+    steps = level_step_evidence(fine, used) + end_evidence(fine) + away_notes(fine.away)
     return _Found(answer, unchecked, fine.settled, steps=steps, way=way, moved=_moves_on(task, fine))
 
 
@@ -352,6 +353,7 @@ def _align_inertial(
         others = biased if others is None else np.concatenate([others, biased], axis=2)
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None, sways=swung)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere + rival_evidence(fine, task.position)
+    steps += end_evidence(fine) if turned is not None and not swung else []
     heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)

@@ -22,6 +22,7 @@ from truenorth.alignment.check import BLIND_RATE, LogCheck, force_size
 from truenorth.alignment.fine import ARM_PRIOR, MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import infer_spec
 from truenorth.alignment.matched import innovations_of
+from truenorth.alignment.setting_off import UNKNOWN, Away, fits_a_table, goes_away, stays_in
 from truenorth.alignment.swaying import farthest
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.alignment.usual import usual
@@ -68,6 +69,7 @@ class TurningAlignment(FineAlignment):
 
     scatter: float  # rad^2; of each axis of level, over the passes
     held: Array  # (n,): see :class:`_Held`
+    away: tuple[Away, ...] = ()  # parts in which the base goes away, and only the gyros are used
 
     @property
     def end(self) -> Array:
@@ -183,9 +185,17 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
     rows_at : (M,) int array
         Rows after which the integrated attitude is wanted.
     """
+    sways = task.motion.overall == "swaying" or rocks_all_along(task.motion)
+    away = () if sways else goes_away(task.record)
+    fine = _fitted(task, spec, rows_at, sways, away)
+    left = tuple(part for part in away if not fits_a_table(fine, part))
+    return fine if left == away else _fitted(task, spec, rows_at, sways, left)
+
+
+def _fitted(task: Task, spec: ImuSpec, rows_at: Array, sways: bool, away: tuple[Away, ...]) -> TurningAlignment:
+    """:func:`turning_align`, of a base that goes away in parts of its log."""
     record, lat, alt = task.record, task.position.lat, task.position.alt
     rate = EARTH_RATE * math.cos(lat)
-    sways = task.motion.overall == "swaying" or rocks_all_along(task.motion)
     arm = ARM_PRIOR if sways else TURN_ARM
     # A boat at anchor swings about another point than the one about which waves roll her.
     slow_arm = ARM_PRIOR if sways else 0.0
@@ -200,8 +210,9 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
     # Of any heading h: it is (sin h, cos h) less the (0, 1) of the convention.
     prior.mean[prior.groups["rate"]] = 0.0, -rate
     begin = record.time[0] - record.interval
-    C, taken = level_of(record.between(None, begin + LEVELLED).accel.mean(axis=0)), np.zeros(len(prior.mean))
-    length = FIRST
+    rests = max([part.end for part in away if math.isfinite(part.end)], default=begin)
+    C, taken = level_of(record.between(rests, rests + LEVELLED).accel.mean(axis=0)), np.zeros(len(prior.mean))
+    length = FIRST + rests - begin
     while True:
         whole = length >= record.duration
         part = record if whole else record.between(None, begin + length)
@@ -216,9 +227,9 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
             sways=sways,
             taken=taken,
         )
-        R = white_variance(mean_velocity(log.integrals, C, lat, alt))
-        everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
-        noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
+        stays = stays_in(log.integrals.start + log.integrals.time, away)
+        R = white_variance(mean_velocity(log.integrals, C, lat, alt)[stays])
+        noise = VelocityNoise(np.where(stays[:, None], R, UNKNOWN**2), [stays], MAX_NOISE_PASSES)
         passes = _Passes(log, noise)
         last = settle(log, partial(_by_level, log, noise), passes.moved, most=LAST if whole else ROUND)
         best = passes.best(at_rest=last.moved < CONVERGED)
@@ -226,7 +237,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> TurningAlignment
         if whole:
             last = Settled(best.found, last.passes, best.moved)
             scatter, disturbance = passes.scatter(best), np.sqrt(best.R)
-            found = TurningAlignment.of(log, last, prior.sensors, disturbance, scatter=scatter, held=end)
+            found = TurningAlignment.of(log, last, prior.sensors, disturbance, scatter=scatter, held=end, away=away)
             return replace(found, settled=best.moved < limit("bound"))
         log.correct(end)
         C, taken, length = log.C_n0_i, log.taken, 2.0 * length
@@ -295,7 +306,7 @@ class _Passes:
     def moved(self, found: Filtered) -> float:
         """By how many sigmas a pass has moved level."""
         by = in_sigmas(LEVEL)(Filtered(found.system, found.estimates))
-        self.last = _Pass(copy.copy(self.log), found, self.noise.R[0], by)
+        self.last = _Pass(copy.copy(self.log), found, self.noise.of_base, by)
         self.likelihoods.append(self.last.log_likelihood)
         self.ups.append(self.last.up)
         if by < limit("bound") and (self.near is None or self.last.log_likelihood > self.near.log_likelihood):

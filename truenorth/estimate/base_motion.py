@@ -190,6 +190,11 @@ class VelocityNoise:
                 estimates = self._filtered(system, known)
         return Filtered(system, estimates) if known is None else FilteredAsKnown(system, estimates, known.gains)
 
+    @property
+    def of_base(self) -> Array:
+        """(3,) the variance of its first part."""
+        return np.asarray(self.R[self.rows[0]][0])
+
     def _known(self, system: LinearSystem) -> Known | None:
         """What a filter makes of a system that logs share, as long as the variance is the usual one."""
         return system.known() if self.usual is self.R and isinstance(system, SharedSystem) else None

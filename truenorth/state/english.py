@@ -68,6 +68,10 @@ SENTENCES = {
     ),
     # ---- a base that stays, against earth and gravity
     "base.moves": "the base does not stay where it is: it moves from {until:.1f} s on",
+    "base.sets_off": (
+        "the base turns and goes away from about {time:.0f} s on: level is that of the rest before, carried on by the gyros"
+    ),
+    "base.stops": "the base moves until about {time:.0f} s: level is that of the rest behind",
     "base.stays": (
         "that the base stays is taken as given: a steady {speed:.2g} m/s towards north or south would turn heading by its sigma, "
         "and the log would not show it"
@@ -131,6 +135,10 @@ SENTENCES = {
     "innovations.coloured": (
         "{name}: innovations are {size:.2f} times as large as their sigma says and follow each other ({colour:.1f} times the error "
         "of white ones): sigma grows {growth:.1f} times"
+    ),
+    "innovations.at_end": (
+        "from {until:.0f} s to its end the log is {factor:.1f} times as far from what its beginning foretells as sigma says: the "
+        "base goes away there"
     ),
     "innovations.left": "{name}: what the answer leaves of it is {size:.2f} times as large as sigma says: sigma grows as much",
     "innovations.late": (
