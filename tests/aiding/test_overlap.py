@@ -74,6 +74,11 @@ def test_a_clock_of_the_day_and_one_with_dates_are_brought_together(drive):
     (aid,) = on_its_day(record, [Gnss(gnss.shifted(SATURDAY))])
     np.testing.assert_allclose(aid.record.time, gnss.time, rtol=0.0, atol=1e-6)
     assert f"{-SATURDAY / DAY:.0f} days" in aid.record.source
-    for other in (gnss, gnss.shifted(SATURDAY + 3.5 * HOUR)):
-        aid = Gnss(other)
-        assert on_its_day(record, [aid]) == [aid]
+    early = record.shifted(-74000.0)  # as a clock that counts from where it was switched on
+    for log, aid in (
+        (record, Gnss(gnss)),
+        (record, Gnss(gnss.shifted(SATURDAY + 3.5 * HOUR))),
+        (record, Gnss(gnss.shifted(SUNDAY))),  # the GPS week's first day: it may count from midnight, or from Sunday
+        (early, Gnss(gnss.shifted(SATURDAY - 74000.0))),
+    ):
+        assert on_its_day(log, [aid])[0] is aid

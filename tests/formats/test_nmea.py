@@ -159,3 +159,19 @@ def test_damage_is_named(line, words, tmp_path):
 def test_too_little(tmp_path):
     with pytest.raises(DataError, match=r"1 epoch\(s\)"):
         read(tmp_path, [gga("120000"), rmc("120000")])
+
+
+def test_a_date_that_stands_still_over_midnight(tmp_path):
+    """Some receivers take the date from their first fix; the clock goes on."""
+    lines = []
+    for k in range(60):
+        now = (86370 + k) % 86400
+        clock = f"{now // 3600:02d}{now // 60 % 60:02d}{now % 60:02d}.00"
+        body = f"GPRMC,{clock},A,4806.60000,N,01130.00000,E,1.94,090.0,221126,,"
+        check = 0
+        for letter in body:
+            check ^= ord(letter)
+        lines.append(f"${body}*{check:02X}\n")
+    file = tmp_path / "x.nmea"
+    file.write_text("".join(lines))
+    np.testing.assert_allclose(np.diff(truenorth.read_gnss(file).time), 1.0, atol=1e-6)

@@ -75,7 +75,8 @@ def test_a_machine_that_creeps_may_have_the_speed_of_its_wheel(standing, speed):
     ):
         zero = zero_updates(standing, "auto", log)[0]
         inside = (zero.time > 101.0) & (zero.time < 199.0)
-        np.testing.assert_allclose(zero.sigma[inside], max(speed, STILL_VELOCITY), atol=0.006)
+        # All of them are off by the same: together they weigh as one.
+        np.testing.assert_allclose(1.0 / np.sqrt(np.sum(1.0 / zero.sigma[inside, 0] ** 2)), speed, rtol=0.15)
         np.testing.assert_allclose(zero.sigma[(zero.time < 99.0) | (zero.time > 201.0)], STILL_VELOCITY, atol=1e-3)
 
 

@@ -69,6 +69,8 @@ def midnights(clock: Array, dates: Array) -> Array:
         around = np.lib.stride_tricks.sliding_window_view(np.pad(origins, AROUND // 2, mode="edge"), AROUND)
         middle = np.median(around, axis=1)
         origins = np.where(np.abs(origins - middle) == DAY, middle, origins)
+        fallen = np.maximum.accumulate(origins) - origins == DAY
+        origins = origins + DAY * fallen  # a date that stands still over midnight: the clock goes on
     own = np.searchsorted(runs[known], runs)  # the first dated sentence of the same time, or a later one
     before = np.maximum(np.searchsorted(known, np.arange(len(clock)), side="right") - 1, 0)
     of_run = (own < len(known)) & (runs[known[np.minimum(own, len(known) - 1)]] == runs)

@@ -22,11 +22,9 @@ from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
 from truenorth.formats import read_encoder, read_gnss, read_height, read_master, read_odometer, read_velocity
 from truenorth.formats.magnetometer import read_magnetometer
-from truenorth.formats.nmea_dates import DATED, DAY
 from truenorth.live.binary_rows import BinaryRows
 from truenorth.live.feed import Feed
 from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
-from truenorth.records import GnssRecord
 
 Array = NDArray[np.float64]
 
@@ -41,9 +39,9 @@ READERS: dict[str, Any] = {
     "attitude": read_master,
 }
 PARTS = {"magnetometer": "mag"}  # what a device's tables are named, where it is not the feed's key
-UNDATED = 10  # epochs of NMEA without a date, from which on none is waited for
+DAY = 86400.0
 BEFORE = 2  # lines: a total of counts needs one before, a record two rows
-PLACE, MOTION, DATES = ("GGA",), ("RMC", "VTG"), ("ZDA",)
+PLACE, MOTION = ("GGA",), ("RMC", "VTG")
 HEADING = re.compile(r"(\w+) ?(?:\[(.+)\])?")
 
 
@@ -88,7 +86,7 @@ class Listener:
         self._header = b""
         self._lines: list[bytes] = []  # text: the lines before the new ones; NMEA: sentences since the epoch before
         self._last = -np.inf
-        self._dated: bool | None = None  # NMEA: whether its clock counts from 1970
+        self._days = 0.0
         self._broken = 0
 
     @property
@@ -157,12 +155,10 @@ class Listener:
         """Sentences; the newest epoch waits until its place and its velocity are there, or another one begins."""
         sound = [line for line in lines if _sound(line)]
         self._broken += len(lines) - len(sound)
-        self._lines += [line for line in sound if line[3:6].decode() in (*PLACE, *MOTION, *DATES)]
+        self._lines += [line for line in sound if line[3:6].decode() in (*PLACE, *MOTION)]
         stamps = [line.split(b",")[1] if line[3:6] != b"VTG" else b"" for line in self._lines]
         epochs = [i for i, stamp in enumerate(stamps) if stamp and stamp not in stamps[:i]]
-        known = [line[3:6] == b"ZDA" or (line[3:6] == b"RMC" and b",A," in line) for line in self._lines]
-        dates = self._dated is not None or any(known)
-        if len(epochs) < (2 if dates else UNDATED):
+        if len(epochs) < 2:
             return
         kinds = {line[3:6].decode() for line in self._lines[epochs[-1] :]}
         end = len(self._lines) if kinds & set(PLACE) and kinds & set(MOTION) else epochs[-1]
@@ -182,23 +178,14 @@ class Listener:
                 self.feed.failure = str(error).replace(Path(file.name).name, self._source)
                 return
         if suffix == ".nmea":
-            record = self._on_one_clock(record)
-            if record is None:
-                return
+            # An IMU beside a receiver seldom knows the date, and no epoch is to wait for one: the time of day, as it goes on.
+            record = record.shifted(-DAY * (record.time[0] // DAY))
+            if record.time[-1] + self._days < self._last - DAY / 2:
+                self._days += DAY
+            record = record.shifted(self._days)
         rows = self.feed.continued(self.feed.rows_of(record))
         self._give(rows[rows[:, 0] > self._last])
         self._last = float(rows[-1, 0])
-
-    def _on_one_clock(self, record: GnssRecord) -> GnssRecord | None:
-        """Sentences on the clock that the first fix had, with a date or without; None before it."""
-        dated = bool(record.time[0] > DATED)
-        if self._dated is None:
-            if not record.has_position.any():
-                return None  # a receiver without a fix does not know the date
-            self._dated = dated
-        if (dated and self._dated) or not np.isfinite(self._last):
-            return record
-        return record.shifted(DAY * round((self._last - float(record.time[-1])) / DAY))
 
     def _give(self, rows: Array) -> None:
         if self._by_arrival and len(rows):

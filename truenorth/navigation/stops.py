@@ -333,13 +333,22 @@ def updates_at(
     if time.size == 0:
         return []
     sigma = np.concatenate([np.full(still.size, STILL_VELOCITY), np.full(disturbed.size, shaken)])
-    sigma = np.maximum(sigma, creeping(np.concatenate([still, disturbed]), wheel))
+    sigma = np.maximum(sigma, _shared(time, creeping(np.concatenate([still, disturbed]), wheel)))
     zero = np.zeros((time.size, 3))
     found = [Aiding("zero velocity", "velocity", time, zero, np.tile(sigma[:, None], 3))]
     if still.size:
         angle = np.tile(np.maximum(angle_scatter(record, still), LEAST_ANGLE), (still.size, 1))
         found.append(Aiding(NO_ROTATION, "rotation", drawn, np.zeros((still.size, 3)), angle))
     return found
+
+
+def _shared(time: Array, speed: Array) -> Array:
+    """(m,) sigma of zero velocities, m/s, of seconds in which the wheel goes: those of one stretch are off together, as one."""
+    sigma, order = speed.copy(), np.argsort(time)
+    goes = order[speed[order] > STILL_VELOCITY]
+    for stretch in np.split(goes, np.flatnonzero(np.diff(time[goes]) > 2.0 * APART) + 1):
+        sigma[stretch] *= math.sqrt(max(len(stretch), 1))
+    return sigma
 
 
 def while_it_stands(updates: Sequence[Aiding], free: Track) -> list[Aiding]:

@@ -17,6 +17,7 @@ SUNDAY = 3.0 * DAY  # 4 January 1970
 LEAP = 18.0  # s, of GPS time ahead of UTC, since 2017
 ROLLED = 1024.0 * WEEK
 ZONES = 14  # hours from UTC, at most
+BRIEF = 0.25 * DAY  # s, both logs together: one in four logs of any other clock would overlap by chance
 SHARE = 0.5  # of the shorter log that overlaps, where a shift explains how far they are apart
 
 Span = tuple[float, float]
@@ -38,18 +39,28 @@ def no_overlap(name: str, of_aid: Span, log: str, of_log: Span) -> DataError:
 
 def shift_of(of_aid: Span, of_log: Span) -> float | None:
     """What to add to the times of an aid, s, where clocks that count from elsewhere explain how far it is apart; else None."""
+    return next((shift for shift in _shifts(of_aid[0], of_log[0]) if _together(of_aid, of_log, shift)), None)
+
+
+def _together(of_aid: Span, of_log: Span, shift: float) -> bool:
     least = SHARE * min(of_aid[1] - of_aid[0], of_log[1] - of_log[0])
-    for shift in _shifts(of_aid[0], of_log[0]):
-        if min(of_aid[1] + shift, of_log[1]) - max(of_aid[0] + shift, of_log[0]) >= least:
-            return shift
-    return None
+    return min(of_aid[1] + shift, of_log[1]) - max(of_aid[0] + shift, of_log[0]) >= least
 
 
 def days_apart(of_aid: Span, of_log: Span) -> float:
-    """What to add to the times of an aid, s, where one of two clocks counts from 1970 and the other from midnight; else 0."""
-    dated = of_aid[0] > DATED, of_log[0] > DATED
-    shift = shift_of(of_aid, of_log) if dated[0] != dated[1] else None
-    return shift if shift is not None and shift % DAY == 0.0 else 0.0
+    """What to add to the times of an aid, s, where one of two clocks counts from 1970 and surely the other from midnight; else 0.
+
+    A clock that counts from where it was switched on shows small numbers, and logs of hours overlap by chance; on the first day of
+    the GPS week that clock shows the same, but for leap seconds.
+    """
+    if (of_aid[0] > DATED) == (of_log[0] > DATED) or min(of_aid[0], of_log[0]) < HOUR:
+        return 0.0
+    if of_aid[1] - of_aid[0] + of_log[1] - of_log[0] > BRIEF:
+        return 0.0
+    shifts = list(_shifts(of_aid[0], of_log[0]))
+    found = [shift for shift in shifts if shift % DAY == 0.0 and _together(of_aid, of_log, shift)]
+    near = [shift for shift in shifts if found and abs(shift - found[0]) < HOUR]
+    return found[0] if len(near) == 1 else 0.0
 
 
 def _shifts(aid: float, log: float) -> Iterator[float]:
