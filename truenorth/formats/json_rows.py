@@ -25,6 +25,7 @@ BEGINS = re.compile(rb'(?:\xef\xbb\xbf)?\s*(\[\s*)?\{\s*"')
 BETWEEN = re.compile(r"[\s,\[]*")
 DEEPEST, LONGEST = 4, 16  # levels of names, numbers of a list that are columns
 FEWEST = 2  # objects
+SPARSE = 10  # times as many cells as there are values: objects with names of their own are no rows of a table
 LAST = 32  # characters from the end, where a text that is cut shows it: ``9.`` is damaged at its point
 
 
@@ -68,7 +69,7 @@ def columns(path: Path) -> Columns:
         if len(names) > MOST_COLUMNS:
             raise _other(path.name, line)
         rows.append((line, row))
-    if len(rows) < FEWEST:
+    if len(rows) < FEWEST or len(rows) * len(names) > SPARSE * sum(len(row) for _, row in rows):
         raise _other(path.name, 1)
     lines: list[str] = []
     for line, row in rows:

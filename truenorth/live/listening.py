@@ -178,7 +178,7 @@ class Listener:
                 self.feed.failure = str(error).replace(Path(file.name).name, self._source)
                 return
         if suffix == ".nmea":
-            # An IMU beside a receiver seldom knows the date, and no epoch is to wait for one: the time of day, as it goes on.
+            # An IMU next to a receiver seldom knows the date, and no epoch is to wait for one: the time of day, as it goes on.
             record = record.shifted(-DAY * (record.time[0] // DAY))
             if record.time[-1] + self._days < self._last - DAY / 2:
                 self._days += DAY
