@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 DAY = 86400.0
 FIRST_YEAR = 80  # of two digits: 1980 to 2079
 AROUND = 9  # dates, whose middle shows that one came early or late at midnight
-DATED = 3e8  # s since 1970: a time beyond it holds a date, of GPS's first year or later
 EPOCH = date(1970, 1, 1).toordinal()
 
 

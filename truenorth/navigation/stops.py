@@ -191,7 +191,7 @@ def creeping(at: Array, wheel: OdometerRecord | VelocityRecord | None) -> Array:
     """
     if not isinstance(wheel, OdometerRecord):
         return np.zeros(len(at))
-    way, span = (np.concatenate([[0.0], np.cumsum(x)]) for x in (wheel.speed * wheel.steps, wheel.steps))
+    way, span = (np.concatenate([[0.0], np.cumsum(x)]) for x in (wheel.distance, wheel.steps))
     first, last = (np.searchsorted(wheel.time, at + half, "right") for half in (-0.5, 0.5))
     return np.asarray(np.abs(way[last] - way[first]) / np.maximum(span[last] - span[first], 1e-9))
 
