@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import truenorth as tn
+from tests.runs import some
 from truenorth.core.attitude import euler_from_dcm
 from truenorth.navigation.first_heading import turn_since_first_row
 from truenorth.simulation import Sway, rest, simulate
@@ -27,11 +28,14 @@ def _heading_off(start, motion):
 
 @pytest.mark.parametrize(
     ("imu", "size", "period"),
-    [
-        *itertools.product(["navigation", "tactical", "industrial", "consumer"], [2.0], [8.0]),
-        *itertools.product(["navigation", "tactical", "industrial", "consumer"], [10.0], [60.0]),
-        *itertools.product(["industrial", "consumer"], [15.0], [240.0]),
-    ],
+    some(
+        [("consumer", 2.0, 8.0), ("tactical", 10.0, 60.0)],
+        [
+            *itertools.product(["navigation", "tactical", "industrial"], [2.0], [8.0]),
+            *itertools.product(["navigation", "industrial", "consumer"], [10.0], [60.0]),
+            *itertools.product(["industrial", "consumer"], [15.0], [240.0]),
+        ],
+    ),
 )
 def test_a_boat_at_anchor_sheers(imu, size, period):
     ratios = []
