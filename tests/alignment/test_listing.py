@@ -58,7 +58,7 @@ def test_a_base_lists_where_gyros_and_gravity_agree(runs, given, swell):
     assert np.mean([found(run, given, tilt=DEGREE, swell=swell) for run in range(runs)]) >= (0.9 if given else 0.75)
 
 
-@few_and_all(60)
+@few_and_all(60, few=4)
 @pytest.mark.parametrize("given", [True, False])
 @pytest.mark.parametrize("grade", ["navigation", "tactical"])
 def test_neither_a_base_at_rest_nor_a_drift_is_a_list(runs, grade, given):

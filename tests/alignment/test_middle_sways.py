@@ -15,7 +15,7 @@ from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
 
 PLACE = Position.from_degrees(48.0, 11.0)
-FEW_AND_ALL = [pytest.param(3, id="few"), pytest.param(40, id="all", marks=pytest.mark.slow)]
+FEW_AND_ALL = [pytest.param(1, id="few"), pytest.param(40, id="all", marks=pytest.mark.slow)]
 
 
 def swayed(seed: int, imu: object, *, duration: float = 40.0, size: float = 1.0, arm: float = 0.3):
@@ -46,7 +46,7 @@ def level_off(answer, C_nb):
     return np.array([down[1], -down[0]]) / np.sqrt(np.diag(answer.phi_covariance)[:2])
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", some([0], [1, 2]))
 @pytest.mark.parametrize("arm", [0.3, 3.0])
 def test_an_arm_is_no_accelerometer_bias(seed, arm):
     """Of sensors a hundred times better than they are taken for: a tilt that swings shows the arm as well as a bias.
@@ -82,7 +82,7 @@ def test_level_and_heading_are_honest(runs, said, imu):
             assert abs(phi[2]) < 4.0
 
 
-@pytest.mark.parametrize("seed", some(range(2), range(2, 4)))
+@pytest.mark.parametrize("seed", some([0], [1, 2, 3]))
 def test_a_base_that_leaves_is_not_silent(seed):
     """A step of velocity within the log, .05 to .4 m/s in two seconds: flagged, or within four sigmas."""
     log = swayed(seed, "navigation", size=0.5)
@@ -103,7 +103,7 @@ def test_a_base_that_leaves_is_not_silent(seed):
 
 @pytest.mark.parametrize(
     ("imu", "duration", "runs"),
-    [pytest.param("industrial", 40.0, 8, marks=pytest.mark.slow), ("tactical", 40.0, 3), ("navigation", 80.0, 1)],
+    [pytest.param("industrial", 40.0, 8, marks=pytest.mark.slow), ("tactical", 40.0, 2), ("navigation", 80.0, 1)],
 )
 def test_a_start_on_a_base_that_rocks_has_the_velocity_of_its_rocking(imu, duration, runs):
     """1 mm/s was said of an IMU that its arm carries to and fro by decimetres a second: what the arm explains goes on."""

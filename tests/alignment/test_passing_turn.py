@@ -41,7 +41,7 @@ def turn(size, begin=120.0, duration=14.0):
     return lambda t: size / duration * np.clip((t - begin) / 0.5, 0, 1) * np.clip((begin + duration - t) / 0.5, 0, 1)
 
 
-@few_and_all(24, 3)
+@few_and_all(24, 1)
 @pytest.mark.parametrize("size", [0.3, 2.5, -6.0])
 def test_it_is_aligned_as_if_it_had_not_turned(runs, size):
     for seed in range(runs):

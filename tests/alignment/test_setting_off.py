@@ -76,7 +76,7 @@ def honest(squares):
     assert np.max(squares) < 4.5**2
 
 
-@few_and_all(60)
+@few_and_all(60, few=2)
 @pytest.mark.parametrize("grade", GRADES)
 def test_a_vehicle_that_sets_off_as_its_log_ends_does_not_spoil_level(grade, runs):
     """An answer is honest, or refused since the base moves; level of industrial IMUs was up to 36 sigmas off, unsaid."""
@@ -93,7 +93,7 @@ def test_a_vehicle_that_sets_off_as_its_log_ends_does_not_spoil_level(grade, run
     honest(squares)
 
 
-@few_and_all(60)
+@few_and_all(60, few=2)
 @pytest.mark.parametrize("grade", GRADES)
 def test_a_vehicle_that_stops_as_its_log_begins_does_not_spoil_level(grade, runs):
     squares = []
@@ -105,7 +105,7 @@ def test_a_vehicle_that_stops_as_its_log_begins_does_not_spoil_level(grade, runs
     honest(squares)
 
 
-@few_and_all(40)
+@few_and_all(40, few=2)
 @pytest.mark.parametrize("first", [False, True])
 @pytest.mark.parametrize("grade", GRADES)
 def test_a_table_that_turns_at_an_end_of_its_log_shows_level_better_than_rest_does(grade, first, runs):

@@ -55,7 +55,7 @@ def level_off(answer, C_nb):
     return np.array([up[1], -up[0]]) / np.sqrt(np.diag(answer.phi_covariance)[:2])
 
 
-@few_and_all(24, 4)
+@few_and_all(24, 2)
 @pytest.mark.parametrize("imu", ["consumer", "industrial", "tactical"])
 @pytest.mark.parametrize("duration", [2.0, 5.0, 12.0])
 def test_seconds_of_rest_without_a_specification(runs, imu, duration):
@@ -67,7 +67,7 @@ def test_seconds_of_rest_without_a_specification(runs, imu, duration):
     assert all(status in ("level_only", "not_converged") for status, _ in found)
 
 
-@few_and_all(40, 6)
+@few_and_all(40, 2)
 @pytest.mark.parametrize("duration", [20.0, 40.0])
 def test_half_a_minute_of_rest_without_a_specification(runs, duration):
     """Tilts hardly show gyros' noise so soon: taken for a navigation grade, a tactical heading was 5.6 sigmas off, `aligned`."""
@@ -76,7 +76,7 @@ def test_half_a_minute_of_rest_without_a_specification(runs, duration):
         assert np.abs(phi).max() < 4.0
 
 
-@few_and_all(16, 4)
+@few_and_all(16, 2)
 @pytest.mark.parametrize("rate", [10, 20])
 def test_a_base_that_trembles_without_a_specification(runs, rate):
     """An Allan variance takes the tremble for quantisation; the biases of a navigation grade were usual of the noise it left."""
@@ -99,7 +99,7 @@ def test_a_base_that_trembles_without_a_specification(runs, rate):
         assert np.abs(level_off(answer, np.eye(3))).max() < 4.0
 
 
-@few_and_all(8, 2)
+@few_and_all(8, 1)
 @pytest.mark.parametrize("size", [0.05, 0.3, 3.0])
 @pytest.mark.parametrize("duration", some([4.0, 19.0], [10.0]))
 @pytest.mark.parametrize("imu", some(["navigation", "consumer"], ["tactical"]))
@@ -123,9 +123,9 @@ def test_seconds_of_sway(runs, imu, duration, size):
             assert np.abs(level_off(answer, made.truth.C_nb[-1])).max() < 4.0
 
 
-@few_and_all(12, 2)
+@few_and_all(12, 1)
 @pytest.mark.parametrize("kind", ["is turned", "turns"])
-@pytest.mark.parametrize("duration", [5.0, 8.0, 12.0, 18.0])
+@pytest.mark.parametrize("duration", some([5.0, 18.0], [8.0, 12.0]))
 def test_a_short_log_in_which_the_imu_turns(runs, kind, duration):
     """It ended in a recursion without end, or with a level that was 5 sigmas off."""
     for seed in range(runs):
