@@ -34,7 +34,7 @@ def test_noise_is_read_from_what_is_faster_than_the_sway(imu: str) -> None:
     assert walks.accel_random_walk == pytest.approx(spec.accel_random_walk, rel=0.3)
 
 
-@pytest.mark.parametrize(("imu", "given"), [("industrial", True), ("consumer", True), ("industrial", False)])
+@pytest.mark.parametrize(("imu", "given"), some([("industrial", False)], [("industrial", True), ("consumer", True)]))
 def test_level_of_a_ship_by_gyros_that_do_not_see_the_earth_turn(imu: str, given: bool) -> None:
     """Carried through ten minutes, such gyros turn by degrees: of logs like these half were refused, or 16 sigmas off."""
     record, place, truth = _ship(imu, 4, 180.0)
@@ -79,7 +79,7 @@ def _buoy(run: int, amplitude: float, period: float):
     return simulation.record, Position.from_degrees(45.0, 10.0), simulation.truth.C_nb[-1]
 
 
-@pytest.mark.parametrize("runs", some([2], [12]))
+@pytest.mark.parametrize("runs", some([1], [12]))
 @pytest.mark.parametrize(("amplitude", "period"), [(30.0, 150.0), (50.0, 200.0)])
 def test_a_heading_that_swings_slowly_shows_biases_and_no_step(runs: int, amplitude: float, period: float) -> None:
     """Biases acted by the mean heading: of 20 logs each 8 and 12 showed accelerometers that step, 2 and 5 were refused for it."""

@@ -83,7 +83,7 @@ def test_signatures_are_made_as_they_are_matched(raft):
     ("vehicle", "grade", "seed", "run", "length"),
     [
         pytest.param(vehicles.buoy, "navigation", 8, 0, 58.3, id="buoy that swings"),
-        pytest.param(vehicles.buoy, "tactical", 8, 2, 43.2, id="buoy that turns"),
+        pytest.param(vehicles.buoy, "tactical", 8, 2, 43.2, id="buoy that turns", marks=pytest.mark.slow),
         pytest.param(vehicles.raft, "navigation", 5, 5, 20.9, id="raft in waves"),
     ],
 )

@@ -5,6 +5,7 @@ import pytest
 
 import truenorth as tn
 from tests.helpers import raises_naming
+from tests.runs import some
 from truenorth.simulation import rest, simulate
 
 PLACE = tn.Position.from_degrees(45.0, 7.0, 300.0)
@@ -19,7 +20,7 @@ def log():
 
 
 @pytest.mark.parametrize("imu", ["industrial", None])
-@pytest.mark.parametrize("at", [20.02, 20.027, 139.997, 140.02, 140.027, 200.0, 200.013, 319.997, 320.0])
+@pytest.mark.parametrize("at", some([20.02, 20.027, 140.027, 200.0, 319.997], [139.997, 140.02, 200.013, 320.0]))
 def test_gyros_that_do_not_see_the_earth_turn_level_at_any_time(log, imu, at):
     """Two minutes before the epoch are taken, and one between two samples lay outside them; so did the first sample."""
     answer = tn.align(log, PLACE, imu, at=at)

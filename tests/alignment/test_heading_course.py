@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.alignment.test_rivals import answered
+from tests.runs import some
 from truenorth.alignment import rivals
 from truenorth.alignment.heading_course import HEADING, HeadingCourse, along_north, course_evidence, heading_course
 from truenorth.core.attitude import dcm_from_rotation_vector
@@ -76,7 +77,7 @@ def drawn(rng, across, along):
     return true - at, linear, found.spread()[0]
 
 
-@pytest.mark.parametrize("along", [5e-4, 5e-5])
+@pytest.mark.parametrize("along", some([5e-5], [5e-4]))
 def test_errors_near_east_are_as_large_as_sigma(along):
     rng = np.random.default_rng(0)
     error, linear, sigma = np.array([drawn(rng, math.radians(1.0), along) for _ in range(300)]).T

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.runs import some
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import (
     BANK_LEVEL,
@@ -118,7 +119,9 @@ def test_a_receiver_that_comes_late_to_a_vehicle_at_rest_shows_its_velocity():
     assert np.all(np.sqrt(np.diag(start.P)[DV]) < 1.0)
 
 
-@pytest.mark.parametrize(("imu", "seed", "rate", "late"), [("navigation", 2, 1.0, 0.0), ("tactical", 1, 10.0, -0.4)])
+@pytest.mark.parametrize(
+    ("imu", "seed", "rate", "late"), some([("tactical", 1, 10.0, -0.4)], [("navigation", 2, 1.0, 0.0)])
+)
 def test_an_aircraft_that_turns_is_aligned_by_fixes_of_centimetres_alone(imu, seed, rate, late):
     """With the velocity of half a second later nine fixes of ten were refused; and so with .4 s taken along the tangent."""
     speed = 40.0 + 10.0 * seed

@@ -41,7 +41,7 @@ def boat(rng):
     return world(rng, place, moves, C, arm, np.zeros_like(t))
 
 
-@pytest.mark.parametrize("run", some([31, 35], [30, 45, 54]))
+@pytest.mark.parametrize("run", some([35], [30, 31, 45, 54]))
 def test_people_who_step_aboard_are_no_known_biases(run):
     """Run 35: level 4.8 sigmas off, in silence. Run 31: a bias of -2.2 mg that was none, 2.6 sigmas."""
     rng = np.random.default_rng([57, run])

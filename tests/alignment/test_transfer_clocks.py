@@ -22,7 +22,7 @@ DEG = np.radians(1.0)
 LATE = 0.03  # s
 
 
-@pytest.fixture(scope="module", params=range(2))
+@pytest.fixture(scope="module", params=some([0], [1]))
 def logs(request):
     """An aircraft with two S-turns alike, and a master that puts each row of ten a second out five times."""
     legs = [*straight(30.0), *s_turn(20 * DEG, 3 * DEG), *straight(60.0), *s_turn(20 * DEG, 3 * DEG), *straight(200.0)]
@@ -50,7 +50,7 @@ def test_a_clock_that_steps_between_them_is_named(logs):
     assert parted_clocks(slave, stepped, np.eye(3), 0.0) is not None
 
 
-@pytest.mark.parametrize("run", range(3))
+@pytest.mark.parametrize("run", some([0], [1, 2]))
 @pytest.mark.parametrize("step", [0.0, 1.0, 22.0])
 def test_the_end_of_a_log_that_resembles_a_turn_is_no_other_clock(run, step):
     """100 s with two S-turns, two rows a second: the last third fits the last 11 s best, by how rows lie. 22 s were named."""
@@ -77,7 +77,7 @@ def test_what_happened_in_an_outage_has_no_course_in_time(run):
 
 
 @pytest.mark.parametrize("attitude", [False, True])
-@pytest.mark.parametrize("off", some([-31.0, 27.0], [24.0, 38.0]))
+@pytest.mark.parametrize("off", some([-31.0], [24.0, 27.0, 38.0]))
 def test_a_clock_far_off_is_not_taken_for_that_of_the_next_turn(off, attitude):
     """Turns that are alike: at another multiple of their time fewer of them agree, by chance better. 9 of 32 were `aligned` so."""
     legs = straight(20.0)
@@ -119,7 +119,7 @@ def test_an_arm_moves_the_delay_that_lengths_of_forces_show(along):
     )  # of an arm that is uncertain by half a metre along each axis
 
 
-@pytest.mark.parametrize("jump", [1.0, -5.0])
+@pytest.mark.parametrize("jump", some([1.0], [-5.0]))
 def test_a_clock_that_jumps_between_turns_is_not_that_of_the_other_turn(logs, jump):
     """The last turn agrees with the first one all over: a delay of 90 s was taken, and the answer `aligned`."""
     slave, master = (log.between(None, 150.0) for log in logs)
