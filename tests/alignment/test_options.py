@@ -3,12 +3,14 @@
 from itertools import combinations
 
 import pytest
-from typer.testing import CliRunner
+import typer
+from click.testing import CliRunner
 
 from truenorth.cli import app
 from truenorth.cli.align_options import BELONGS, CLASHES, PROCEDURES
 from truenorth.core.errors import UsageError
 
+COMMANDS = typer.main.get_command(app)
 VALUES = {
     "--positions": "auto",
     "--arm-sigma": "0.1",
@@ -26,7 +28,7 @@ VALUES = {
 def said(*options):
     """What an alignment of a log that does not exist is refused with."""
     words = [word for option in options for word in (option, VALUES.get(option, "file.csv"))]
-    result = CliRunner().invoke(app, ["align", "none.csv", "--lat", "48", *words])
+    result = CliRunner().invoke(COMMANDS, ["align", "none.csv", "--lat", "48", *words])
     assert isinstance(result.exception, UsageError), (words, result.output, result.exception)
     assert result.exception.exit_code == 2
     return str(result.exception)
@@ -60,5 +62,7 @@ def test_what_a_procedure_would_not_look_at_is_refused(option, procedure):
 def test_what_goes_together_comes_to_the_log():
     assert "none.csv" in said("--odometer", "--gnss", "--offset", "--mounting")
     assert "none.csv" in said("--method")
-    result = CliRunner().invoke(app, ["align", "none.csv", "--lat", "48", "--positions", "auto", "--method", "auto"])
+    result = CliRunner().invoke(
+        COMMANDS, ["align", "none.csv", "--lat", "48", "--positions", "auto", "--method", "auto"]
+    )
     assert "none.csv" in str(result.exception)
