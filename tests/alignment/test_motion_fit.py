@@ -98,21 +98,21 @@ def test_as_likely_as_the_truth(name, count):
             assert found.sigma == pytest.approx(np.std(y), rel=4 / math.sqrt(2 * count))
 
 
-def walked(walks, count, seed):
-    """Velocity by random walks."""
-    rng = np.random.default_rng(seed)
+def walked(walks, count, seeds):
+    """Velocities by random walks, one of each seed."""
+    draws = np.stack([np.random.default_rng(seed).standard_normal((count, 2)) for seed in seeds], axis=1)
     Phi, Q = walks.blocks(1.0)
-    noise, x, y = np.linalg.cholesky(Q), np.zeros(2), np.empty(count)
+    noise, x, y = np.linalg.cholesky(Q), np.zeros((len(seeds), 2)), np.empty((len(seeds), count))
     for k in range(count):
-        x = Phi @ x + noise @ rng.standard_normal(2)
-        y[k] = x[0]
+        x = x @ Phi.T + draws[k] @ noise.T
+        y[:, k] = x[:, 0]
     return y
 
 
 @pytest.mark.parametrize("walks", [Walks(1e-3, 1e-12), Walks(1e-9, 1e-4)], ids=["velocity", "tilt"])
 def test_expected_periodogram_of_the_walks(walks):
     """Mean of 300, above the bins of the trend: of a walk of tilt a twentieth of what is below leaks."""
-    many = [Series(walked(walks, 256, seed), 1.0, walks) for seed in range(300)]
+    many = [Series(y, 1.0, walks) for y in walked(walks, 256, range(300))]
     ratio = np.mean([item.periodogram / item.walked for item in many], axis=0)[LOWEST_BIN + 1 : -8]
     assert np.median(ratio) == pytest.approx(1.0, abs=0.1)
     assert 0.5 < ratio.min() < ratio.max() < 1.6
@@ -123,7 +123,7 @@ def test_a_sea_of_tones_is_not_lost_in_the_walk_of_poor_sensors(seed):
     """20 minutes: a walk of tilt has the highest peaks, and one of the sea's tones is a line. Both were searched, 3000 likelier."""
     rng = np.random.default_rng(seed)
     t, walks = np.arange(1200.0), Walks(1e-3, 3e-4)
-    y = walked(walks, len(t), seed)
+    (y,) = walked(walks, len(t), [seed])
     y += sum(0.02 * np.sin(2.0 * math.pi * (t / period + rng.uniform())) for period in rng.uniform(6.0, 10.0, 4))
     series = Series(y, 1.0, walks)
     seas = AxisMotion(1e-4, (Oscillator(2, 0.03, 0.72, 0.03), Oscillator(2, 0.03, 0.92, 0.03)))
