@@ -63,6 +63,8 @@ def test_a_sound_log_has_none(monkeypatch):
     asked = []
     of = rotary.accel_scale_evidence
     monkeypatch.setattr(rotary, "accel_scale_evidence", lambda *given: asked.append(of(*given)) or asked[-1])
-    assert BENCHES["rotary"].align(inputs).status == "aligned"
+    answer = BENCHES["rotary"].align(inputs)
+    assert answer.status == "aligned"
+    assert not [item for item in answer.evidence if item.key.startswith("tilt.")]
     assert np.all([item == [] for item in asked])
     assert asked

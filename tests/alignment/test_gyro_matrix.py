@@ -161,7 +161,8 @@ def boat(seed):
     return simulate(motion, rate=50.0, duration=400.0, imu="navigation", seed=seed).record
 
 
-@pytest.mark.parametrize("seed", some([10], [22]))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [10, 22])
 def test_a_slow_surge_that_the_fitted_motion_leaves_out_turns_no_gyros(seed):
     """With another motion these are likelier as given, too; turns of some tenths of a degree were in sigma before."""
     answer = align(boat(seed), DOCK, imu="navigation")
@@ -208,7 +209,8 @@ def test_accelerometers_that_are_turned_are_not_the_gyros_alone(run):
     assert answer.status == "inconsistent"
 
 
-@pytest.mark.parametrize("degrees", some([[0.0, 0.0, 0.0]], [([0.1, -0.26, -0.22],)]))
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", [[0.0, 0.0, 0.0], [0.1, -0.26, -0.22]])
 def test_a_turn_on_an_indexer_is_refused(degrees):
     """193 sigmas of heading, `aligned`."""
     inputs, _ = BENCHES["rotary"].draw(SEED, 0)
