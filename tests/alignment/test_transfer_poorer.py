@@ -16,6 +16,7 @@ from truenorth.simulation.manoeuvres import straight
 FAULT = "specification ten times too good"
 
 
+@pytest.mark.slow
 def test_gyros_that_see_no_turn_have_no_scale_factor():
     """The rate of a slave that goes straight on is its noise, and a scale factor of -1 took that out: 45 where chance gives 10."""
     way = course(Position.from_degrees(20.0, 115.0), straight(400.0), heading=0.6, speed=6.0)

@@ -41,6 +41,7 @@ def test_three_accelerometers_that_warm_up_together_are_named():
     assert found.status == "inconsistent" or np.abs(misses(found, truth)["heading"]) < 3.0
 
 
+@pytest.mark.slow
 def test_a_vertical_accelerometer_that_steps_alone_is_no_warming():
     inputs, _ = SWAYING.draw(41130, 1)
     record = inputs["record"]
