@@ -64,10 +64,10 @@ class TestRingLaserOnADisturbedVehicle:
         assert np.max(np.abs(errors)) > 2.0
         assert np.all(np.abs(errors) < 3 * np.array(sigmas))
 
-    @pytest.mark.parametrize("method", some(["inertial"], ["oba"]))
-    def test_other_inertial_methods_agree(self, method):
+    @pytest.mark.parametrize(("method", "windows"), some([("inertial", 1)], [("inertial", 3), ("oba", 3)]))
+    def test_other_inertial_methods_agree(self, method, windows):
         record, position = recordings.rlg_vehicle_xian()
-        for window in _windows(record, 300.0):
+        for window in _windows(record, 300.0)[:windows]:
             answer = align(window, position, method=method)
             assert abs(_heading(answer) - 90.6) < 3 * np.degrees(answer.euler_sigma[0])
             assert abs(_heading(answer) - 90.6) < 0.2
@@ -150,9 +150,9 @@ def test_stim300_cart_that_rolls_off_is_noticed():
 
 
 def test_another_epoch_of_the_same_log():
-    """The attitude at 100 s asked of a 300 s log is that of a log that ends there, within the sigmas."""
+    """The attitude at 100 s asked of a 200 s log is that of a log that ends there, within the sigmas."""
     record, position = recordings.rlg_vehicle_xian()
-    window = record.between(None, 300.0)
+    window = record.between(None, 200.0)
     early = align(window, position, "navigation", at=100.0)
     alone = align(record.between(None, 100.0), position, "navigation")
     assert early.time == 100.0

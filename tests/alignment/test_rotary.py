@@ -248,7 +248,7 @@ def test_wrapped_angles_are_counted_on(tmp_path):
 
 def test_the_command(ship, tmp_path):
     for name, record in (("imu.parquet", ship.record), ("encoder.parquet", ship.encoder)):
-        write_record(record, tmp_path / name)
+        write_record(record.between(None, 70.0), tmp_path / name)
     arguments = ["align", str(tmp_path / "imu.parquet"), "--lat", repr(math.degrees(ship.place.lat)), "--json"]
     more = [
         "--indexer",
@@ -286,8 +286,8 @@ def test_published_filters_find_the_body_on_an_indexer(ship, method):
 
 
 def test_a_published_filter_on_an_indexer_by_the_command_line(ship, tmp_path):
-    write_record(ship.record.between(None, 200.0), tmp_path / "imu.csv")
-    write_record(ship.encoder, tmp_path / "encoder.csv")
+    write_record(ship.record.between(None, 80.0), tmp_path / "imu.csv")
+    write_record(ship.encoder.between(None, 81.0), tmp_path / "encoder.csv")
     arm = ",".join(f"{x:g}" for x in ship.arm)
     where = ["--lat", "40", "--lon", "118", "--imu", "navigation", "--indexer", str(tmp_path / "encoder.csv")]
     asked = ["align", str(tmp_path / "imu.csv"), *where, "--lever-arm", arm, "--json", "--method"]

@@ -26,8 +26,8 @@ KALIBR = {
     "accelerometer_random_walk": 3.0e-3,
 }
 # Runs of each; run 2 of the drives was 5 and 7 sigmas off.
-FEW = [("still", [0, 1, 2, 3]), ("swaying", [0]), ("gnss", [2]), ("navigate", [2])]
-MORE = [("still", [4, 5]), ("swaying", [1]), ("gnss", [0, 1]), ("navigate", [0, 1])]
+FEW = [("still", [0]), ("swaying", [0]), ("navigate", [2])]
+MORE = [("still", [1, 2, 3, 4, 5]), ("swaying", [1]), ("gnss", [0, 1, 2]), ("navigate", [0, 1])]
 
 
 def noise_of(spec):
@@ -106,6 +106,7 @@ def test_an_imu_without_any_bias_has_an_answer_that_is_a_number(kind):
 
 def test_an_odometer_s_gyros_without_any_bias_leave_heading_no_part_by_them():
     inputs, _ = BENCHES["odometer"].draw(5, 0)
+    inputs["record"] = inputs["record"].between(None, 60.0)
     answer = BENCHES["odometer"].align(inputs | {"imu": noise_of(inputs["imu"]) | {"unnamed": "zero"}})
     assert np.isfinite(answer.phi_covariance).all()
 
