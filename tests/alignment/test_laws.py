@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from tests.runs import few_and_all
+from tests.runs import few_and_all, some
 from truenorth.alignment import align
 from truenorth.core.attitude import (
     dcm_from_euler,
@@ -37,7 +37,7 @@ def biased(record: ImuRecord, eps, nabla) -> ImuRecord:
 
 
 @pytest.mark.parametrize("method", ["analytic", "inertial", "oba", "kalman"])
-@pytest.mark.parametrize("lat", [-60.0, -5.0, 40.0])
+@pytest.mark.parametrize("lat", some([-60.0, 40.0], [-5.0]))
 def test_static_limits(method, lat):
     """phi_E = -nabla_N/g, phi_N = nabla_E/g, phi_U = -eps_E/(w_ie cos L) + phi_N tan L, for every sign of each."""
     position = Position.from_degrees(lat, 10.0, 0.0, horizontal_sigma=0.0, vertical_sigma=0.0)
@@ -57,7 +57,7 @@ def test_static_limits(method, lat):
 
 
 @pytest.mark.parametrize("method", ["analytic", "inertial", "oba", "kalman"])
-@pytest.mark.parametrize("lat", [-80.0, -34.0, 0.0, 80.0])
+@pytest.mark.parametrize("lat", some([-34.0, 0.0], [-80.0, 80.0]))
 def test_a_perfect_imu_is_aligned_perfectly(method, lat):
     position = Position.from_degrees(lat, 10.0, 0.0)
     motion = rest(position, np.radians(222.0), 0.2, -0.4)

@@ -273,6 +273,7 @@ def test_only_what_is_unknown_is_estimated(real):
     assert "33 states" in result.method_reason  # the INS, and axes of gyros and accelerometers
 
 
+@pytest.mark.usefixtures("without_rivals")
 def test_errors_of_the_master_count_in_sigma_and_not_in_the_sigma_against_it(real, found):
     """The mean of 2 arcmin of heading cannot be seen by a slave: absolute sigma is no less; the answer hardly moves."""
     slave, master = real
