@@ -109,8 +109,8 @@ def seen(innovation, late=0.0, prior=0.02):
     ones = np.ones(len(time), dtype=bool)
     r = Residuals("GNSS velocity", time, z, np.ones_like(z), (z**2).sum(axis=1), ones, 0, time + late, ~ones)
     layout = Layout(("GNSS lag",), ((prior,),))
-    P = np.tile(np.diag([1e-6] * 15 + [0.002**2]), (len(time), 1, 1))
-    level = np.tile(np.eye(3), (len(time), 1, 1))
+    P = np.broadcast_to(np.diag([1e-6] * 15 + [0.002**2]), (len(time), 16, 16))
+    level = np.broadcast_to(np.eye(3), (len(time), 3, 3))
     v_n = np.tile([0.0, 10.0, 0.0], (len(time), 1))
     return Track(time, level, v_n, np.tile([0.8, 0.2, 0.0], (len(time), 1)), np.zeros((len(time), 16)), P, layout, (r,))
 
