@@ -23,22 +23,22 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Files that take the most time, longest first: no worker begins one of them when the others are done.
 LONGEST = [
-    "documents/test_documents",
     "formats/test_corpus",
-    "alignment/test_transfer",
-    "formats/test_field_logs",
-    "formats/test_second_reading",
+    "documents/test_documents",
+    "quality/test_one_sign",
+    "live/test_lasting",
     "fuzz/test_listed",
-    "test_cli",
-    "alignment/test_laws",
     "test_import",
+    "test_cli",
     "navigation/test_departure",
-    "alignment/test_unsaid",
-    "fuzz/test_readers",
-    "formats/test_logs_read_before",
-    "live/test_run",
+    "campaign/test_run",
+    "test_messages",
+    "quality/test_inspection",
     "navigation/test_navigate",
-    "alignment/test_rotary",
+    "live/test_gaps",
+    "formats/test_second_reading",
+    "documents/test_commands",
+    "formats/test_field_logs",
 ]
 
 # Time on the wall counts what else the machine does; the first example of a property may compile its kernels.

@@ -82,7 +82,7 @@ def inside(total, runs):
     return low < total < high
 
 
-@few_and_all(12, few=4)
+@few_and_all(12, few=2)
 def test_navigation_is_honest_with_it(drive, plugin, runs):
     motion, total = drive[0], 0.0
     for run in range(runs):

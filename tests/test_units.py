@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.helpers import raises_naming
@@ -156,6 +156,7 @@ def test_format_is_what_a_person_would_write():
     assert format(0.0, "deg", digits=None) == "0 deg"
 
 
+@settings(max_examples=40)
 @given(st.text(max_size=12))
 def test_any_text_is_a_quantity_or_a_usage_error(text):
     for candidate in (text, f"1 {text}"):

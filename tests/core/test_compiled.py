@@ -219,6 +219,7 @@ print("numba.np.arrayobj" in sys.modules)
 """
 
 
+@pytest.mark.slow
 def test_kernels_that_make_arrays_come_from_the_disk_without_what_compiled_them(tmp_path):
     """It takes longer to load than the kernel; what they say in errors, Numba's own among it, stays."""
     kernel = """

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.runs import some
 from truenorth.alignment import align
 from truenorth.core.position import Position
 from truenorth.errors.staying import QUIETEST_BASE, StaticModel
@@ -86,8 +87,10 @@ def sheering():
     return simulate(ship, rate=50.0, duration=200.0, imu=imu_spec("tactical"), seed=3).record
 
 
-@pytest.mark.parametrize("method", ["swaying", "kalman"])
-@pytest.mark.parametrize("kind", ["increments", "rates"])
+@pytest.mark.parametrize(
+    ("method", "kind"),
+    some([("swaying", "increments"), ("kalman", "rates")], [("swaying", "rates"), ("kalman", "increments")]),
+)
 def test_errors_of_a_turned_imu_go_on_as_in_the_filter_of_the_whole_log(sheering, method, kind):
     scale = 1.0 if kind == "increments" else 1.0 / sheering.interval
     record = replace(sheering, gyro=scale * sheering.gyro, accel=scale * sheering.accel, kind=kind)

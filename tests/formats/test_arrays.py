@@ -149,9 +149,13 @@ RECORDINGS = [
     ("mems_rotation_table/static_and_rotation_0_162s.npz", "mems_rotation_table",
      {"columns": {"gyro": "counts[3:6]", "accel": "counts[0:3]", **COUNTS}, "units": "deg/s,g"}),
 ]  # fmt: skip
+LONG = ("static_adis16405",)  # 10,000 s; its axes are those of logs of the corpus, its counts those of the others
 
 
-@pytest.mark.parametrize(("file", "name", "options"), RECORDINGS, ids=[name for _, name, _ in RECORDINGS])
+@pytest.mark.parametrize(
+    ("file", "name", "options"),
+    [pytest.param(*log, marks=[pytest.mark.slow] * (log[1] in LONG), id=log[1]) for log in RECORDINGS],
+)
 def test_real_recordings_by_options_alone(file, name, options):
     expected = getattr(recordings, name)()[0]
     record = read_imu(recordings.DATA / file, **options)

@@ -97,7 +97,7 @@ def test_a_log_that_is_cut_anywhere(tmp_path):
     """The last object is left out; no cut ends in a traceback."""
     made = list(objects("lists"))[:60]
     for text in (json.dumps(made, indent=1), "\n".join(map(json.dumps, made))):
-        for end in range(1, len(text), 97):
+        for end in range(1, len(text), 389):
             path = write(tmp_path / "log.json", text[:end])
             record = read_or_none(path)
             assert record is not None or end < len(text) / 10

@@ -8,7 +8,7 @@ from tests.formats.test_field_logs import attitude, rows
 from truenorth.core.errors import DataError
 from truenorth.formats import UnsureError, read_gnss, read_imu
 
-MOVED = truth("swaying", "tactical", 100.0, 40.0)
+MOVED = truth("swaying", "tactical")
 
 
 def answered(path, right, **options):

@@ -31,7 +31,7 @@ def assert_same_bits(a: ImuRecord, b: ImuRecord):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("kind", ["rates", "increments"])
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(values=arrays(float, (5, 6), elements=st.floats(-1e4, 1e4)))
 def test_any_number_comes_back(suffix, kind, values, tmp_path_factory):
     path = tmp_path_factory.mktemp("log") / f"log{suffix}"

@@ -96,7 +96,7 @@ def test_one_row_that_lacks_its_beginning_and_a_matrix_above_the_header_are_note
     ],
 )  # fmt: skip
 def test_a_counter_that_starts_anew_goes_on(tmp_path, name, ticks, period):
-    counts = (np.round(ticks * MOVED.time, 6) - np.round(ticks * MOVED.time[2000], 6) + period) % period
+    counts = (np.round(ticks * MOVED.time, 6) - np.round(ticks * MOVED.time[1000], 6) + period) % period
     path = tmp_path / "log.csv"
     stamps = [f"{count:.15g}" for count in counts]
     path.write_text(f"{name},gx,gy,gz,ax,ay,az\n" + rows(stamps, MOVED.gyro, MOVED.accel))

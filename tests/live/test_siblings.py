@@ -146,7 +146,7 @@ def test_the_track_of_a_run_too_long_to_be_kept_is_as_unsure_along_the_way():
 
 def test_siblings_that_break_down_leave_the_answer_as_it_is(monkeypatch):
     """As in :func:`truenorth.navigate`: there is nothing to compare, and the loop's own sigma stands."""
-    case = Anchored(CALM, "consumer", 120.0, 3)
+    case = Anchored(CALM, "consumer", 60.0, 3)
     run, alone = case.run(), case.run()
     case.feed(run, 25)
     usual = run.answer

@@ -112,7 +112,7 @@ def seen_by(rng, shared, time, rows=600, said=SAID):
 
 @pytest.mark.parametrize(
     ("shared", "time"),
-    some([(0.0, np.inf), (1.0, np.inf), (0.5, 300.0)], [(0.1, np.inf), (0.5, np.inf), (1.0, 3600.0)]),
+    some([(0.0, np.inf), (0.5, 300.0)], [(1.0, np.inf), (0.1, np.inf), (0.5, np.inf), (1.0, 3600.0)]),
 )
 def test_what_is_not_white_may_be_shared(shared, time):
     """The mean of what sigma allows for over 200 receivers is what is shared, to what so many fixes can show."""

@@ -22,7 +22,7 @@ from truenorth.state.track import Track
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
 
-@pytest.mark.parametrize(("late", "key"), some([(0, None)], [(10, "delay.gyros_late"), (-20, "delay.gyros_early")]))
+@pytest.mark.parametrize(("late", "key"), some([(0, None)], [(5, "delay.gyros_late"), (-10, "delay.gyros_early")]))
 def test_gyros_of_another_moment_are_found(drive, late, key):
     """By a tenth of a second and more, to 30 ms; sound ones are left alone."""
     motion, record, start = drive

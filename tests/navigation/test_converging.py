@@ -44,20 +44,21 @@ def converging(motion, kind, seed):
 def velocity_in_sigmas(motion, track):
     """Of all epochs but the first second."""
     k = (track.time > 1.0) & (track.time < TIME[-1])
-    v = np.array([motion.states(t).v_n for t in track.time[k]])
+    v = motion.states(track.time[k]).v_n
     return (track.v_n[k] - v) / np.sqrt(np.diagonal(track.P[k], axis1=1, axis2=2)[:, 3:6])
 
 
 @pytest.mark.parametrize("kind", [SAME, ESTIMATED, NEW])
 def test_velocity_is_as_sure_as_it_is_said_to_be(drive, kind):
-    """Twelve receivers of each kind. What lasts for seconds leads the velocity away where it is taken for white noise."""
+    """Twelve receivers of each kind, four as before. What lasts leads the velocity away where it is taken for white noise."""
     motion, record, start = drive
     plan = Plan(record.between(None, TIME[-1]), start, InsModel.from_spec(SPEC), "gnss", [], 0.2, 5, 0.0)
     now, before = [], []
     for seed in range(12):
         aid = Gnss(converging(motion, kind, seed), Mounting())
         now.append(velocity_in_sigmas(motion, plan.run(plan.sources({"gnss": aid}))))
-        before.append(velocity_in_sigmas(motion, plan.run(aid.sources("gnss"))))
+        if kind != NEW and seed < 4:
+            before.append(velocity_in_sigmas(motion, plan.run(aid.sources("gnss"))))
     assert np.abs(now).max() < 4.0
     assert np.sqrt(np.mean(np.square(now))) < 1.2
     if kind != NEW:

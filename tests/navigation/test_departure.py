@@ -38,11 +38,11 @@ def test_a_gentle_departure_ends_the_rest(imu, acceleration, onset):
     motion = course(
         PLACE, [*straight(STILL), *accelerate(12.0, acceleration, 0.0, onset), *straight(60.0)], heading=HEADING
     )
-    log = simulate(motion, rate=50.0, duration=90.0, imu=imu, seed=5).record
+    log = simulate(motion, rate=25.0, duration=70.0, imu=imu, seed=5).record
     start = tn.known_start(log, PLACE, imu, HEADING, SIGMA)
     assert start.time <= STILL + 0.2 * onset
     assert (_off(start, motion) < 4.0).all()
-    time = np.arange(1.0, 89.0)
+    time = np.arange(1.0, 69.0)
     s = motion.states(time)
     fixes = tn.GnssRecord(time, s.lat, s.lon, s.alt, s.v_n)
     assert tn.navigate(log, start, aid=tn.Gnss(fixes), imu=imu).status == "navigated"

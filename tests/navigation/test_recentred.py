@@ -122,14 +122,14 @@ def test_an_arm_that_is_not_known_makes_a_turn_of_the_heading_bent():
     assert linear_within(with_fixes_of(aid, 2.0, None)) == LINEAR
 
 
-@pytest.mark.parametrize("seed", some([2], [0, 1, 3, 4, 5]))
-def test_fixes_of_centimetres_on_an_arm_that_is_not_said(seed):
+@pytest.mark.parametrize(("seed", "duration"), some([(2, 120.0)], [(seed, DURATION) for seed in range(6)]))
+def test_fixes_of_centimetres_on_an_arm_that_is_not_said(seed, duration):
     """Heading is known to 5 deg at the start: four of these six cars were refused, heading 16 to 49 sigmas off."""
     rng, spec = np.random.default_rng([seed, 7]), imu_spec("tactical")
-    motion = car(rng, DURATION)
-    record = simulate(ideal_log(motion, rate=25.0, duration=DURATION), imu=spec, seed=seed).record
+    motion = car(rng, duration)
+    record = simulate(ideal_log(motion, rate=25.0, duration=duration), imu=spec, seed=seed).record
     begun = drawn_start(motion, spec, rng)
-    aid = with_fixes_of(received(motion, DURATION, 1.0, rng, place=0.02), 0.02, None)["gnss"]
+    aid = with_fixes_of(received(motion, duration, 1.0, rng, place=0.02), 0.02, None)["gnss"]
     start = turned(begun, math.radians(5.0) * rng.standard_normal(), math.radians(5.0))
     result = navigate(record, start, aid=aid, imu=spec)
     assert result.status == "navigated", result.reasons

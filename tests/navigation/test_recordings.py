@@ -89,6 +89,7 @@ def _without(gnss, start, stop):
     return GnssRecord(gnss.time[kept], gnss.lat[kept], gnss.lon[kept], gnss.alt[kept], dop=gnss.dop[kept])
 
 
+@pytest.mark.slow
 def test_car_with_gnss_and_odometer(car):
     """Innovations no larger than expected, smaller where the receiver's dilutions say more than it errs by; the car looks where it
     drives; the record's gap is bridged and named."""

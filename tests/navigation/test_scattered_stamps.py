@@ -92,8 +92,9 @@ def running(log, start, aid, chunk, until=np.inf, path=None, mounting=None):
 def test_a_running_answer_finds_it_too_whatever_the_chunks_saved_or_not(monkeypatch, tmp_path, most):
     """By glances at its innovations alone, without a look; and by so many looks."""
     monkeypatch.setattr(lasting, "LOOKS", lasting.LOOKS[:most])
-    case = flown(3, 0.15)
-    one, other = running(*case, 10), running(*case, 60, until=80.0, path=tmp_path / "run.npz")
+    log, *case = flown(3, 0.15)
+    case = log.between(None, 100.0), *case
+    one, other = running(*case, 10), running(*case, 60, until=70.0, path=tmp_path / "run.npz")
     assert one._loop.shown.stamps == pytest.approx(0.15, rel=0.4)
     assert any("stamps scatter" in reason for reason in one.answer.reasons)
     for name in ("v_n", "position", "v_sigma", "position_sigma"):

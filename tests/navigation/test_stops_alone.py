@@ -1,5 +1,7 @@
 """Drives whose stops are all that is known of their speed: a zero velocity says nothing of heading."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,7 @@ def stops_of(motion):
     return [(time[a], time[b - 1]) for a, b in edges if b - a > 3]
 
 
+@cache
 def navigated(grade, seed):
     rng, spec = np.random.default_rng(seed), imu_spec(grade)
     motion = drive(rng)

@@ -1,5 +1,7 @@
 """Logs whose rate of rows changes: where it does, and the record of one rate that is made of them."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -18,9 +20,14 @@ from truenorth.strapdown.increments import across_gaps, increments
 SWAY = (0.5, 1.0, 1.5)
 
 
+@cache
+def every_millisecond(duration, seed):
+    return base(SWAY, duration=duration, interval=0.001, seed=seed)
+
+
 def log(*parts, kind="increments", seed=0):
     """A base that sways, `parts` (rows a second, s) after another: sums of rows of 1 kHz, or their values."""
-    fine = base(SWAY, duration=sum(length for _, length in parts), interval=0.001, seed=seed)
+    fine = every_millisecond(sum(length for _, length in parts), seed)
     ends = [np.zeros(1, dtype=int)]
     for rate, length in parts:
         ends.append(ends[-1][-1] + np.round(np.arange(1, round(rate * length) + 1) * 1000 / rate).astype(int))

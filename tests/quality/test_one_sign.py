@@ -38,27 +38,32 @@ def test_the_axis_that_is_vertical_is_asked():
     assert check_tilt(flipped(on_its_side, 0)).sign.axis == 0
 
 
+def test_a_sound_answer_is_a_good_one():
+    inputs = BENCHES["swaying"].draw(*YAWS_LITTLE)[0]
+    assert align(inputs["record"], inputs["place"], inputs["imu"]).status == "aligned"
+
+
+@pytest.mark.usefixtures("without_gyro_matrix")
 def test_such_an_answer_is_no_good_one():
     """It was `aligned`, its level 40 sigmas off."""
     inputs = BENCHES["swaying"].draw(*YAWS_LITTLE)[0]
-    answers = [align(log, inputs["place"], inputs["imu"]) for log in (inputs["record"], flipped(inputs["record"]))]
-    assert [answer.status for answer in answers] == ["aligned", "inconsistent"]
+    assert align(flipped(inputs["record"]), inputs["place"], inputs["imu"]).status == "inconsistent"
 
 
 @pytest.mark.parametrize("run", some([20], [0, 26, 5]))
 @pytest.mark.parametrize("kind", ["ship", "moored", "raft", "buoy"])
-def test_no_sound_log_has_a_wrong_sign(kind, run):
+@pytest.mark.parametrize("grade", some(["tactical"], ["navigation"]))
+def test_no_sound_log_has_a_wrong_sign(kind, run, grade):
     """Moored ship 20: without a bound on what is left, her own motion is 8 sigmas nearer to the other sign."""
     rng = np.random.default_rng([78, 1000 + run])
     make = (
         (lambda rng, length: vehicles.ship(rng, length, moored=True)) if kind == "moored" else getattr(vehicles, kind)
     )
     world = make(rng, 170.0)
-    for grade in ("tactical", "navigation"):
-        record = sensed(rng, world, imu_spec(grade), 50.0)
-        for log in (record, replace(record, gyro=record.gyro[:, [2, 0, 1]], accel=record.accel[:, [2, 0, 1]])):
-            tilt = check_tilt(log)
-            assert tilt is None or tilt.sign is None
+    record = sensed(rng, world, imu_spec(grade), 50.0)
+    for log in (record, replace(record, gyro=record.gyro[:, [2, 0, 1]], accel=record.accel[:, [2, 0, 1]])):
+        tilt = check_tilt(log)
+        assert tilt is None or tilt.sign is None
 
 
 @pytest.mark.parametrize("rate", [1.0, 4.0])

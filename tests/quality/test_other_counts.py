@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.quality.alternation import alternation_evidence
 from truenorth.quality.other_counts import counts_in_turn
@@ -50,8 +51,9 @@ def test_every_second_row_of_another_sensor_is_found_and_its_turn_too(angle, car
 
 
 @pytest.mark.parametrize("carried", [True, False])
-def test_one_counter_is_one(carried):
-    for seed in range(20):
+@few_and_all(20, few=5)
+def test_one_counter_is_one(carried, runs):
+    for seed in range(runs):
         log = record(counted(np.random.default_rng([2, seed]), carried=carried))
         assert not any(counts_in_turn(log, period) for period in (2, 3, 5))
         assert alternation_evidence(log) == []

@@ -68,7 +68,7 @@ def test_the_level_force_that_is_left_is_that_of_an_axis():
     assert push.level == pytest.approx(0.1 / np.sqrt(2.0), rel=0.1)
 
 
-@pytest.mark.parametrize("run", some([0, 3], [4, 6, 7, 8]))
+@pytest.mark.parametrize("run", some([0], [3, 4, 6, 7, 8]))
 def test_a_raft_that_follows_the_slope_of_waves_has_no_late_gyros(run):
     """Six of ten sound rafts that were refused: gyros .09 to .34 s early, about both axes alike."""
     rng = np.random.default_rng([31, run, 9])
@@ -76,7 +76,7 @@ def test_a_raft_that_follows_the_slope_of_waves_has_no_late_gyros(run):
     assert {item.kind for item in check_tilt(record).evidence()} <= {"hint"}
 
 
-@pytest.mark.parametrize("run", range(4))
+@pytest.mark.parametrize("run", some([0, 1], [2, 3]))
 def test_late_gyros_of_a_ship_that_sways_are_named(run):
     inputs, _ = BENCHES["swaying"].draw(31, run)
     found = check_tilt(_late(0.4)(inputs)["record"])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.campaign.faults import run_faults
 from truenorth.quality.spikes import one_sided, spikes_evidence
@@ -93,8 +94,9 @@ def test_knocks_after_which_the_base_is_at_rest_again_are_none():
 
 @pytest.mark.parametrize("every", [0.3, 0.5, 0.7, 1.0, 1.5, 3.0])
 @pytest.mark.parametrize("answer", [relaxing(0.05), relaxing(), springing(1.0, 0.3), springing(2.0, 0.2)])
-def test_nor_are_steady_ones_whose_answers_overlap(every, answer):
-    for seed in range(8):
+@few_and_all(8, few=2)
+def test_nor_are_steady_ones_whose_answers_overlap(every, answer, runs):
+    for seed in range(runs):
         rng = np.random.default_rng([7, seed])
         at = steady(rng, every)
         values = noise(rng) + knocks(at, 60.0 * rng.uniform(0.7, 1.3, len(at)), answer)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from tests.simulation.made import ARM, DRIVE, FERRY, LOADED, PLACE, SENSORS
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.earth import ecef_axes, ecef_from_geodetic
@@ -195,11 +196,12 @@ def dcm_from_rotation(v):
     return Rotation.from_rotvec(v).as_matrix()
 
 
-def test_gnss_errors_have_the_covariance_that_the_record_states():
-    """One row of each of 400 runs, so that drift is independent: chi-square of 400 x 3, within 4.5 sigma (1 in 1e5)."""
+@few_and_all(400, few=100)
+def test_gnss_errors_have_the_covariance_that_the_record_states(runs):
+    """One row of each run, so that drift is independent: each of three by a chi-square of so many, within 4.5 sigma (1 in 1e4)."""
     spec = GnssSpec(position_noise=1.0, position_drift=2.0, velocity_noise=0.03, velocity_drift=0.04, vertical=2.0)
     nees = np.zeros((2, 3))
-    for run in range(400):
+    for run in range(runs):
         record = simulate_sensor(DRIVE, spec, duration=2.0, start=30.0, seed=9, run=run).record
         at = DRIVE.states(record.time)
         place = ecef_from_geodetic(record.lat, record.lon, record.alt) - ecef_from_geodetic(at.lat, at.lon, at.alt)
@@ -208,7 +210,7 @@ def test_gnss_errors_have_the_covariance_that_the_record_states():
             (error[-1] / record.position_sigma[-1]) ** 2,
             ((record.v_n - at.v_n)[-1] / record.velocity_sigma[-1]) ** 2,
         ]
-    assert np.all(np.abs(nees / 400 - 1.0) < 4.5 * np.sqrt(2 / 400))
+    assert np.all(np.abs(nees / runs - 1.0) < 4.5 * np.sqrt(2 / runs))
     assert record.position_sigma[0].tolist() == pytest.approx([np.sqrt(5), np.sqrt(5), 2 * np.sqrt(5)])
 
 

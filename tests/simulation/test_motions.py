@@ -6,6 +6,7 @@ from scipy.interpolate import PPoly
 
 from tests.helpers import come_back
 from tests.physics.test_strapdown_coning import residual
+from tests.runs import some
 from tests.simulation.test_route import TOWN
 from truenorth.core.attitude import euler_from_dcm, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
@@ -60,7 +61,7 @@ FAMILIES = {
 }
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@pytest.mark.parametrize("name", some([name for name in FAMILIES if name != "swell"], ["swell"]))
 def test_an_ideal_imu_comes_back_from_every_smooth_motion(name):
     """720 s at 100 Hz: .05 arcsec, 1e-4 m/s; the position follows within a centimetre."""
     _, turned, v, moved = come_back(FAMILIES[name], 100.0, 720.0, every=10)

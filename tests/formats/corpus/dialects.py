@@ -381,7 +381,7 @@ def logs() -> list[Log]:
     )
     add(
         "time_goes_back.csv",
-        text(Truth(np.where(sway.time > 20.0, sway.time - 3.0, sway.time), sway.gyro, sway.accel), SI),
+        text(Truth(np.where(sway.time > 10.0, sway.time - 3.0, sway.time), sway.gyro, sway.accel), SI),
         sway,
         refused="time goes back",
     )

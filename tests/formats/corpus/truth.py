@@ -40,7 +40,7 @@ class Truth:
 
 
 @cache
-def truth(base: str = "still", grade: str = "tactical", rate: float = 100.0, seconds: float = 40.0) -> Truth:
+def truth(base: str = "still", grade: str = "tactical", rate: float = 100.0, seconds: float = 20.0) -> Truth:
     """A base that is ``still`` (heading 30 deg, level to half a degree), ``swaying`` by degrees, or ``driven`` in bends."""
     time = np.arange(1, round(rate * seconds) + 1) / rate
     heading, pitch, roll = np.full_like(time, 30.0 * DEG), np.full_like(time, 0.4 * DEG), np.full_like(time, -0.3 * DEG)
