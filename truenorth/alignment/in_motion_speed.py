@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from truenorth.core.earth import radii
+from truenorth.core.position import eastward
 from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
 
 PACE = 5.0  # s, over which fixes show a speed
@@ -41,7 +42,7 @@ def speed_at(gnss: GnssRecord, time: float) -> float:
     R_M, R_N = radii(float(gnss.lat[last]))
     north, east = (
         R_M * (gnss.lat[last] - gnss.lat[rows[0]]),
-        R_N * math.cos(gnss.lat[last]) * (gnss.lon[last] - gnss.lon[rows[0]]),
+        R_N * math.cos(gnss.lat[last]) * eastward(gnss.lon[last], gnss.lon[rows[0]]),
     )
     return math.hypot(north, east) / float(gnss.time[last] - gnss.time[rows[0]])
 

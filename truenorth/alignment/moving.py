@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.earth import EARTH_RATE, radii
+from truenorth.core.position import eastward
 from truenorth.errors.axes import standing
 from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 
@@ -154,7 +155,7 @@ class Moving:
         """(2,) m; east and north, from the beginning of the track to its end."""
         (lat, lon, alt), (lat0, lon0, _) = self.track.position[-1], self.track.position[0]
         R_M, R_N = radii(0.5 * (lat + lat0))
-        return np.array([(R_N + alt) * math.cos(lat) * (lon - lon0), (R_M + alt) * (lat - lat0)])
+        return np.array([(R_N + alt) * math.cos(lat) * eastward(lon, lon0), (R_M + alt) * (lat - lat0)])
 
     def summary(self) -> dict[str, Any]:
         """In datasheet units, ready for JSON."""

@@ -17,7 +17,7 @@ from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.transfer import ON_MASTER
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
-from truenorth.core.position import METRES_PER_RADIAN, Position
+from truenorth.core.position import METRES_PER_RADIAN, Position, eastward
 from truenorth.navigation import navigate
 from truenorth.navigation.result import Navigation
 from truenorth.simulation.scenario import Scenario, read_scenario
@@ -255,7 +255,7 @@ def misses(answer: Alignment | Navigation, truth: Truth) -> dict[str, Array]:
         at = truth(float(track.time[-1]))
         phi = -rotation_vector_from_dcm(track.C_nb[-1] @ at.C_nb.T)
         lat, lon, alt = track.position[-1]
-        east = (lon - float(at.lon) + math.pi) % (2.0 * math.pi) - math.pi
+        east = float(eastward(lon, float(at.lon)))
         dp = [east * METRES_PER_RADIAN * math.cos(lat), (lat - float(at.lat)) * METRES_PER_RADIAN, alt - float(at.alt)]
         off = np.concatenate([phi, track.v_n[-1] - at.v_n, dp]) / np.maximum(track.sigma[-1, :9], 1e-12)
         off[[5, 8]] = 0.0 if answer.altitude == "fixed" else off[[5, 8]]

@@ -36,7 +36,7 @@ from truenorth.coarse.wahba import davenport_matrices, rotation_from_davenport
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, ecef_axes, normal_gravity, radii
 from truenorth.core.errors import DataError
-from truenorth.core.position import Position
+from truenorth.core.position import Position, eastward
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.state.mounting import Mounting
 from truenorth.strapdown.increments import increments
@@ -144,7 +144,8 @@ def gnss_track(gnss: GnssRecord, at: Array, mounting: Mounting | None = None) ->
             f"{LEAST_FIXES} within the IMU's log, on its clock: check it (`record.shifted`)"
         )
     height = np.where(np.isfinite(gnss.alt), gnss.alt, 0.0)
-    place = np.stack([np.interp(at, time[fixed], a[fixed]) for a in (gnss.lat, gnss.lon, height)], axis=1)
+    lat, lon, alt = gnss.lat[fixed], np.unwrap(gnss.lon[fixed]), height[fixed]
+    place = np.stack([np.interp(at, time[fixed], a) for a in (lat, lon, alt)], axis=1)
     when, v = velocities_shown(gnss, mounting)
     return np.stack([np.interp(at, when, v[:, i]) for i in range(3)], axis=1), place
 
@@ -164,7 +165,7 @@ def velocities_shown(gnss: GnssRecord, mounting: Mounting) -> tuple[Array, Array
     T = np.diff(t)
     v = np.stack(
         [
-            np.diff(lon) * (R_N + alt[:-1]) * np.cos(lat[:-1]) / T,
+            eastward(lon[1:], lon[:-1]) * (R_N + alt[:-1]) * np.cos(lat[:-1]) / T,
             np.diff(lat) * (R_M + alt[:-1]) / T,
             np.diff(alt) / T,
         ],

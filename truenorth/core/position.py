@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from truenorth.core.errors import UsageError
 from truenorth.core.numeric import is_masked, is_number
@@ -102,3 +105,9 @@ class Position:
     def lat_sigma(self) -> float:
         """One-sigma error of the latitude, rad."""
         return self.horizontal_sigma / METRES_PER_RADIAN
+
+
+def eastward(lon: Any, lon0: Any) -> Any:
+    """By how much longitudes lie east of others, rad, the shorter way round: across the date line, too."""
+    apart = lon - lon0
+    return apart - 2.0 * math.pi * np.round(apart / (2.0 * math.pi))

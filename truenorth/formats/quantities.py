@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import SEMI_MAJOR
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import eastward
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import unknown_key
 from truenorth.formats.behaviour import EPOCH
@@ -231,7 +232,8 @@ def _ask_clock(found: Found) -> None:
         return
     size = 1e-3 if step < 1e3 * LONG_STEP else 1e-6
     if found.has("lat", "lon"):
-        moved = np.hypot(np.diff(found.values["lat"]), np.diff(found.values["lon"]) * np.cos(found.values["lat"][1:]))
+        lat, lon = found.values["lat"], found.values["lon"]
+        moved = np.hypot(np.diff(lat), eastward(lon[1:], lon[:-1]) * np.cos(lat[1:]))
         if np.nanmax(moved / np.diff(time), initial=0.0) * SEMI_MAJOR > FASTEST * size:
             return
     unit = {1e-3: "ms", 1e-6: "us"}[size]

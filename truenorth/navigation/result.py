@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import angle_text, euler_from_dcm, euler_sigma, to_rotation
 from truenorth.core.earth import radii
+from truenorth.core.position import eastward
 from truenorth.core.shown import Shown
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.errors.axes import proper_bias, standing
@@ -143,8 +144,9 @@ class Navigation(Shown):
         """(K, 2) metres east and north of the start, on the ellipsoid there."""
         lat, lon, alt = self.position.T
         R_M, R_N = radii(lat[0])
-        away = (lon - lon[0] + np.pi) % (2 * np.pi) - np.pi
-        return np.stack([away * (R_N + alt[0]) * np.cos(lat[0]), (lat - lat[0]) * (R_M + alt[0])], axis=1)
+        return np.stack(
+            [eastward(lon, lon[0]) * (R_N + alt[0]) * np.cos(lat[0]), (lat - lat[0]) * (R_M + alt[0])], axis=1
+        )
 
     @cached_property
     def distance(self) -> float:

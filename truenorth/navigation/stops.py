@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.source import Aiding
 from truenorth.core.earth import radii
 from truenorth.core.errors import UsageError
+from truenorth.core.position import eastward
 from truenorth.quality.aid_noise import STANDING
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.quality.regimes import DISTURBED, STILL, motion_summary
@@ -225,7 +226,7 @@ def _speed_of_places(log: GnssRecord) -> tuple[Array, NDArray[np.bool_]]:
     if time.size < FEWEST_FIXES:
         return np.empty(0), np.empty(0, dtype=bool)
     R_M, R_N = radii(lat[0])
-    place = np.stack([(lon - lon[0]) * R_N * np.cos(lat[0]), (lat - lat[0]) * R_M], axis=1)
+    place = np.stack([eastward(lon, lon[0]) * R_N * np.cos(lat[0]), (lat - lat[0]) * R_M], axis=1)
     # Second differences of white noise have six times its variance; a steady course has none.
     noise = float(np.median(np.abs(np.diff(place, n=2, axis=0)))) / 0.6745 / np.sqrt(6.0)
     speed, said = np.full(time.size, np.nan), np.zeros(time.size, dtype=bool)

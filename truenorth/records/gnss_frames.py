@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
+from truenorth.core.position import eastward
 from truenorth.records import GnssRecord
 
 Array = NDArray[np.float64]
@@ -85,7 +86,7 @@ def _check_vertical(source: str, alt: Array, climbed: Array, close: NDArray[np.b
 def _steps(lat: Array, lon: Array) -> Array:
     """(N-1, 2) metres east and north from row to row; latitudes beyond the poles are taken as they are."""
     R_M, R_N = radii(lat[:-1])
-    return np.stack([np.diff(lon) * R_N * np.cos(lat[:-1]), np.diff(lat) * R_M], axis=1)
+    return np.stack([eastward(lon[1:], lon[:-1]) * R_N * np.cos(lat[:-1]), np.diff(lat) * R_M], axis=1)
 
 
 def _rms(values: Array) -> float:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
+from truenorth.core.position import eastward
 from truenorth.records.gnss import GnssRecord
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ def _places(record: GnssRecord, rows: NDArray[np.intp]) -> tuple[Array, float]:
     """(N, 2) metres east and north of the first fix, and the resolution of the places, m."""
     lat, lon = record.lat[rows], record.lon[rows]
     meridian, prime = radii(lat[0])
-    away = np.column_stack([(lon - lon[0]) * prime * np.cos(lat[0]), (lat - lat[0]) * meridian])
+    away = np.column_stack([eastward(lon, lon[0]) * prime * np.cos(lat[0]), (lat - lat[0]) * meridian])
     return away, max(_resolution(away[:, 0]), _resolution(away[:, 1]))
 
 
