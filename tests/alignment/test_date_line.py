@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.alignment.test_in_motion import RING, changed
+from tests.alignment.test_in_motion import changed
 from truenorth import Position, align
 from truenorth.aiding.aids import Gnss, Odometer
 from truenorth.alignment.in_motion_speed import speed_at
@@ -59,7 +59,7 @@ def test_places_between_fixes_cross_as_well(elsewhere):
 
 @pytest.mark.parametrize("aid", ["wheel", "gnss"])
 def test_alignment(drive, elsewhere, aid):
-    record, wheel, _, lon = drive
+    record, wheel, *_ = drive
     found = []
     for receiver in elsewhere:
         aids = Gnss(receiver) if aid == "gnss" else Odometer(wheel)

@@ -55,6 +55,7 @@ def moving_answer(
     groups = (GYRO_AXES, ACCEL_AXES) if task.antenna.lever_arm.any() else (GYRO_AXES, ACCEL_AXES, ANTENNA_ARM)
     moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting, groups)
     delays = delays_found(track, {"GNSS": task.antenna, "odometer": task.wheel, "velocity log": task.wheel})
+    known = np.diag(moving.P)[BG]
     # Navigation goes on from there: what heading is less sure of belongs to it, too.
     less_sure = covariance[2, 2] - history.phi_covariance[-1][2, 2]
     if task.gnss is None and not task.more:
@@ -62,6 +63,8 @@ def moving_answer(
         position = replace(position, horizontal_sigma=float(np.sqrt(np.diag(moving.P)[DP][:2].max())))
     elif spread.heading > 0.0:
         moving = moving.off_together(apart)
+    # A heading that is less sure goes with what the gyros' biases make of the earth's rate.
+    gyro_more = np.diag(moving.P)[BG] - known
     clocks = rates_found(track, task.antenna)
     moving = replace(moving, delays=delays, clocks=clocks, acting_bias=track.accel_bias[-1])
     return Alignment(
@@ -74,7 +77,7 @@ def moving_answer(
         phi_covariance=covariance,
         phi_floor=history.phi_floor[-1],
         gyro_bias=track.gyro_bias[-1],
-        gyro_bias_sigma=history.gyro_bias_sigma[-1],
+        gyro_bias_sigma=np.sqrt(history.gyro_bias_sigma[-1] ** 2 + gyro_more),
         gyro_bias_prior=prior[:3],
         accel_bias=history.accel_bias[-1],
         accel_bias_sigma=history.accel_bias_sigma[-1],

@@ -6,6 +6,9 @@ columns of the biases turn against those of the tilt, and that passes for knowle
 steady speed, knew their level to .4 deg where 1.8 are known, and were up to 13 of these off. So the last pass holds
 biases across the vertical, and what they do to level is in its covariance, with the correlations that navigation goes on with.
 Where the log speaks against it, since the vehicle has turned, it is not taken.
+
+A wheel or a Doppler log alone shows velocity along the body's axes: a tilt turns it, ``dv = v x phi``, upwards above all, and the
+way with it, ``dp = int dv dt``. Fixes show both in n.
 """
 
 from __future__ import annotations
@@ -14,11 +17,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from truenorth.alignment.in_motion_task import MovingTask
+from truenorth.core.attitude import skew
 from truenorth.core.earth import normal_gravity
 from truenorth.errors.axes import standing
-from truenorth.state.layout import BA, PHI
+from truenorth.state.layout import BA, DP, DV, PHI
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -35,4 +40,7 @@ def with_level_biases(task: MovingTask, track: Track) -> Track:
     N[:, PHI] = TILTS @ track.C_nb / normal_gravity(task.position.lat, task.position.alt)
     N[:, BA] = np.eye(3)
     N = N @ across
+    if task.gnss is None and not task.more:
+        N[:, DV] = skew(track.v_n) @ N[:, PHI]
+        N[:, DP] = cumulative_trapezoid(N[:, DV], track.time, axis=0, initial=0.0)
     return replace(track, P=track.P + (N * variance) @ np.swapaxes(N, 1, 2))
