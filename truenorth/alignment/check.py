@@ -37,6 +37,7 @@ BLIND_RATE = math.radians(5.0) / 3600.0  # rad/s: a mean rate this far from the 
 LOOSE_GYRO, LOOSE_ACCEL = math.radians(10.0) / 3600.0, 0.5  # rad/s, m/s^2: priors that let the log speak
 HELD_GYRO, HELD_ACCEL = 1e-3 * LOOSE_GYRO, 1e-3 * LOOSE_ACCEL
 # Along east, north and up: loose where the log can answer, held where tilt or heading would take the blame.
+SWINGS, STRETCHES = 20.0, 20  # s at the most, in which the force of a base that swings averages out; of a log, at least
 FREE_GYRO = np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2])
 FREE_ACCEL = np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2])
 
@@ -159,9 +160,14 @@ def fit_task_noise(
 
 
 def force_size(task: Task) -> tuple[float, float]:
-    """By how much the specific force is larger than gravity in the mean, whatever the attitude, and its noise, m/s^2."""
-    # By intervals, in the inertial frame: turns are taken off, and a vibration averages out.
-    size = np.linalg.norm(integrate(task.record, task.interval).mean_force, axis=1)
+    """By how much the specific force is larger than gravity in the mean, whatever the attitude, and its noise, m/s^2.
+
+    By stretches, in the inertial frame: turns are taken off, and what pushes a base to and fro averages out. Of a load on a rope of
+    length l that swings by an angle A it is ``g cos + v^2 / l`` along the rope, ``g A^2 / 4`` more than gravity in the mean: .25 mg
+    of 2 deg. An attitude that gyros carry through 20 s at the most does not need their scale factors.
+    """
+    stretch = max(task.interval, min(SWINGS, task.record.duration / STRETCHES))
+    size = np.linalg.norm(integrate(task.record, stretch).mean_force, axis=1)
     return float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size))
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from truenorth.analysis.chi_square import tail
 from truenorth.core.errors import DataError
 from truenorth.estimate.responses import likeliest, signatures_of
-from truenorth.estimate.rivals import Rival, moved
+from truenorth.estimate.rivals import Rival, likelihood_ratio, moved
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.limits import limit
@@ -62,15 +62,24 @@ def warming_rivals(run: Callable[[ImuRecord], Track], first: Track, record: ImuR
         ratio, size = likeliest(signatures_of(first.residuals, passes, STEP), precision=MOST**-2)
         found = max(found, (ratio, size * sigma, time), key=lambda item: item[0])
     ratio, size, time = found
-    as_rare = -2.0 * math.log(min(1.0, len(TIMES) * tail(ratio, 3) + LEAST_CHANCE))
-    if as_rare <= limit("rival"):
+    if _as_rare(ratio) <= limit("rival"):
         return []
     try:
-        effect = moved(first, run(without_warming(record, size, time)))
+        without = run(without_warming(record, size, time))
     except DataError:
         return []
+    # Responses hold for gains that stay as they are. Where a change moves the gains, it has to be shown by the whole of it.
+    as_rare = _as_rare(min(ratio, likelihood_ratio(first.residuals, without.residuals, one_model=True)))
+    if as_rare <= limit("rival"):
+        return []
+    effect = moved(first, without)
     figures = {"size": float(np.abs(size).max()), "time": time}
     return [Rival(as_rare, "rival.accels_warm_up", figures, effect)]
+
+
+def _as_rare(ratio: float) -> float:
+    """The likelihood ratio that is as rare by chance as the largest of those of `TIMES`."""
+    return -2.0 * math.log(min(1.0, len(TIMES) * tail(ratio, 3) + LEAST_CHANCE))
 
 
 def without_warming(record: ImuRecord, size: Array, time: float) -> ImuRecord:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.attitude import Attitude
-from truenorth.aiding.magnetometer import HARD, SOFT, Magnetometer
+from truenorth.aiding.magnetometer import HARD, SEAT, SOFT, Magnetometer
 from truenorth.live.feed import Feed, table
 from truenorth.records import MasterRecord
 from truenorth.records.magnetometer import MagnetometerRecord
@@ -65,7 +65,7 @@ class MagnetometerFeed(Feed):
             self.field,
             hard_iron=self.hard_iron,
             soft_iron=self.soft_iron,
-            mounting=self.mounting or Mounting(),
+            mounting=self.mounting or Mounting(angle_sigma=SEAT),
         )
 
     def dummy(self) -> Array:
