@@ -32,6 +32,7 @@ from truenorth.estimate.correct import (
     touched,
     update_held,
 )
+from truenorth.estimate.late import keep_moment, show
 from truenorth.estimate.memory import (
     ABSENT,
     DISTURB,
@@ -105,6 +106,8 @@ def correct(
     With `exact` its innovations are those of `room.z`.
     """
     source, now, R = events.source[k], room.now, room.R
+    if model.opened and exact != (m.shown[0] > 0.0):
+        show(m, model, exact, w)
     for a in range(3):
         R[a] = events.variance[k, a]
     measure(m, model, sources, source, events.measured[k], now, w, R)
@@ -172,8 +175,12 @@ def correct(
         for b in range(len(m.aux)):
             kept.dx[link, b] = w.x[b]
     if model.opened:
+        if exact:
+            keep_moment(m, model, w.x, w)
         keep_apart(m.x, w.x)
         if time >= model.until:
+            if not exact:
+                keep_moment(m, model, m.x, w)
             feed_back(m.s, m.aux, m.x, model.dynamics.turns)
             set_matrix(m.s, m.sums.C_now)
         return SOUND
@@ -182,6 +189,7 @@ def correct(
     along_curve.reset(m, model, in_body, lever, w)
     if model.invariant >= IN_BODY:
         along_curve.move_lever(m.lever, w.x, sources.over_ground[source], w.P)
+    keep_moment(m, model, w.x, w)
     feed_back(m.s, m.aux, w.x, model.dynamics.turns)
     set_matrix(m.s, m.sums.C_now)
     return SOUND

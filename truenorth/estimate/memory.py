@@ -67,7 +67,8 @@ class Model(NamedTuple):
     """What of the error model the kernel needs.
 
     `spare` (s): an event of the grid so soon after another is passed over; `opened`: no correction is fed back before `until` (s);
-    `exact`: innovations are those of the motion with its errors taken off (:mod:`truenorth.estimate.apart`).
+    `exact`: innovations are those of the motion with its errors taken off (:mod:`truenorth.estimate.apart`). `lag`: the delay of
+    fixes, or -1.
     """
 
     dynamics: Dynamics
@@ -83,6 +84,7 @@ class Model(NamedTuple):
     opened: bool = False
     until: float = 0.0
     exact: bool = False
+    lag: int = -1
 
 
 class Task(NamedTuple):
@@ -139,7 +141,7 @@ class Memory(NamedTuple):
     `P` (n, n) along w; `x` (n,) errors that are known and not fed back, along w: zeros in a closed loop; `largest` (n,) variances
     so far; `sums` since the last event, `means` up to it; `done` (1,) part of the next sample that is taken; `heard` (1,) when the
     vertical loop was fed; `lever` (3,) m, the way from the place about which the vehicle turns with its azimuth, along w, and what
-    that leaves out; `refused` (S,) rows rejected in a row.
+    that leaves out; `shown` (1,) whether columns are of the motion less the errors `x`; `refused` (S,) rows rejected in a row.
     """
 
     s: Array
@@ -152,14 +154,15 @@ class Memory(NamedTuple):
     done: Array
     heard: Array
     lever: Array
+    shown: Array
     refused: Integers
 
     def copy(self) -> Memory:
         """Arrays of its own."""
         sums, means = (Sums(*(a.copy() for a in part)) for part in (self.sums, self.means))
         s, aux, P, x, largest = (a.copy() for a in self[:5])
-        done, heard, lever = (a.copy() for a in self[7:10])
-        return Memory(s, aux, P, x, largest, sums, means, done, heard, lever, self.refused.copy())
+        done, heard, lever, shown = (a.copy() for a in self[7:11])
+        return Memory(s, aux, P, x, largest, sums, means, done, heard, lever, shown, self.refused.copy())
 
 
 def memory(s: Array, aux: Array, P: Array, begin: float, sources: int, x: Array | None = None) -> Memory:
@@ -178,5 +181,6 @@ def memory(s: Array, aux: Array, P: Array, begin: float, sources: int, x: Array 
         np.zeros(1),
         np.array([begin]),
         np.append(lever_of(P), 0.0),
+        np.zeros(1),
         np.zeros(sources, dtype=np.int64),
     )

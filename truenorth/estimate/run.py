@@ -260,6 +260,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         setting.open_until is not None,
         setting.open_until or 0.0,
         setting.exact,
+        _lag_of_fixes(sources, model),
     )
     seen = kernel_sources(sources, model)
     task = Task(state.samples, state.taken, Events(*plan), Events(*late), seen, of_model, horizon)
@@ -288,6 +289,14 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
     if setting.covariance:
         turn(C_nw, v_n, position, 1.0, P)
     return after, Track(kept.time[:outputs], C_nb, v_n, position, sensors, P, model.layout, residuals)
+
+
+def _lag_of_fixes(sources: Sequence[Aiding], model: InsModel) -> int:
+    """The state that is the delay of places over the ground; -1: none."""
+    for source in sources:
+        if source.row.over_ground and source.row.unit == "m" and "lag" in source.states and not source.retimed:
+            return model.layout.first_of(source.states["lag"].name)
+    return -1
 
 
 def _nothing(model: InsModel, sources: Sequence[Aiding]) -> Track:
