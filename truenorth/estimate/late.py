@@ -1,79 +1,63 @@
 """A place that is shown late: what a correction of the motion does to what is known of the delay.
 
-Fixes alone show ``p - tau v``. Whatever the motion, another delay and the same motion at another moment look alike but for what the
-IMU shows of when it pushes. What is known after a fix is therefore
+A fix shows ``p - tau v``. Whatever the motion, another delay and the same motion at another moment look alike, but for what the IMU
+shows of when it pushes. What fixes tell is therefore
 
-    eta = dp + v dtau,   eta' = dv + a dtau
+    eta = dp + v dtau
 
-and with columns at the latest velocity, ``H = v_hat``, it is not what is known at the next: a correction has taken ``x_v`` off the
-velocity, which nothing has pushed, and the column has a step that looks like one of a motion. A fix after it seems to show how
-late it is, by the noise of the one before. Of a robot that does 1 m/s with a consumer IMU and fixes of a metre most of what the
-filter knew of a delay was of that kind, and errors of fixes that last, alike from row to row, led it away: by nine of its sigmas,
-pass by pass. So errors are carried over a correction so that ``eta`` and ``eta'`` stay:
+and not either of the two. The column of the delay is the latest velocity. Once a correction has taken ``x_v`` off that, ``eta`` is
+no more what was known: the column has a step that nothing has pushed, and the next fix seems to show how late it is, by the noise of
+the one before. Of a robot that does 1 m/s, with a consumer IMU and fixes of a metre, most of what the filter knew of a delay was of
+that kind. And errors of fixes that last, alike from row to row, led the delay away, pass by pass: by twenty of its sigmas. So errors
+are carried over a correction such that ``eta`` stays,
 
-    dp <- dp + (v_before - v_after) dtau,   dv <- dv + (a_before - a_after) dtau
+    dp <- dp + (v_before - v_after) dtau
+
+What is known of velocity stays as it is: a vehicle that stands shows it undelayed. (The same with ``dv + a dtau`` gave a delay of
+which zero velocities knew .03 s.) In an open loop (:mod:`truenorth.estimate.apart`) columns are of the motion that it is linear
+about as long as heading is any, and of the motion less its known errors from then on: that is a step of the column, too.
 
 Source: G. Huang, A. Mourikis and S. Roumeliotis, "Observability-based rules for designing consistent EKF SLAM estimators", Int. J.
-Robotics Research 29 (2010): what nothing shows must stay so from row to row. These errors of a delay are ours.
+Robotics Research 29 (2010): what nothing shows must be the same from row to row. The rule for a delay is ours.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from truenorth.core.attitude import cross
 from truenorth.core.compiled import borrowing
-from truenorth.estimate.memory import Memory, Model
+from truenorth.state.now import NOW_PUSH
 
-_PHI, _DV, _DP, _BA = 0, 3, 6, 12
-
-
-@borrowing(forceinline=True)
-def steps(m: Memory, model: Model, x: Any) -> Any:
-    """By how much velocity and its change are less after a correction `x` than before, m/s and m/s^2 along w: tuples."""
-    f, C, slow = m.means.vectors[0], m.sums.C_now, model.sensors[1]
-    b = (x[_BA], x[_BA + 1], x[_BA + 2])
-    if slow >= 0:
-        b = (b[0] + x[slow], b[1] + x[slow + 1], b[2] + x[slow + 2])
-    turned = cross((x[_PHI], x[_PHI + 1], x[_PHI + 2]), (f[0], f[1], f[2]))
-    a = (
-        C[0, 0] * b[0] + C[0, 1] * b[1] + C[0, 2] * b[2] - turned[0],
-        C[1, 0] * b[0] + C[1, 1] * b[1] + C[1, 2] * b[2] - turned[1],
-        C[2, 0] * b[0] + C[2, 1] * b[1] + C[2, 2] * b[2] - turned[2],
-    )
-    return (x[_DV], x[_DV + 1], x[_DV + 2]), a
+_DV, _DP = 3, 6
 
 
 @borrowing(forceinline=True)
-def keep_moment(m: Memory, model: Model, x: Any, w: Any) -> None:
-    """Carry `w.P` over a correction `x` that is about to be fed back."""
-    lag = model.lag
+def keep_moment(lag: int, x: Any, P: Any) -> None:
+    """Carry `P` (N, N) over a correction `x` of the motion that columns are of; `lag`: the state of the delay, -1: none."""
     if lag < 0:
         return
-    v, a = steps(m, model, x)
-    N = w.P.shape[0]
-    for j in range(N):
+    for j in range(P.shape[0]):
         for i in range(3):
-            w.P[_DV + i, j] += a[i] * w.P[lag, j]
-            w.P[_DP + i, j] += v[i] * w.P[lag, j]
-    for j in range(N):
+            P[_DP + i, j] += x[_DV + i] * P[lag, j]
+    for j in range(P.shape[0]):
         for i in range(3):
-            w.P[j, _DV + i] += a[i] * w.P[j, lag]
-            w.P[j, _DP + i] += v[i] * w.P[j, lag]
+            P[j, _DP + i] += x[_DV + i] * P[j, lag]
 
 
 @borrowing(forceinline=True)
-def show(m: Memory, model: Model, exact: bool, w: Any) -> None:
-    """Columns are from now on those of the motion less its known errors (`exact`), or those of the motion again."""
-    sign = 1.0 if exact else -1.0
-    m.shown[0] = 1.0 * exact
-    for j in range(len(m.x)):
-        w.x[j] = sign * m.x[j]
-    keep_moment(m, model, w.x, w)
-    if model.lag >= 0:
-        v, a = steps(m, model, w.x)
+def as_it_moves(lag: int, x: Any, H: Any) -> None:
+    """Take the errors `x` that are known off the velocity in the column of a place that is shown late."""
+    if lag >= 0 and H[2, _DP + 2] != 0.0 and H[2, lag] != 0.0:
         for i in range(3):
-            m.x[_DV + i] += a[i] * m.x[model.lag]
-            m.x[_DP + i] += v[i] * m.x[model.lag]
-    for j in range(len(m.x)):
-        w.x[j] = 0.0
+            for j in range(3):
+                H[i, lag] -= H[i, _DP + j] * x[_DV + j]
+
+
+@borrowing(forceinline=True)
+def as_late_as_known(lag: int, x: Any, now: Any, H: Any) -> None:
+    """Make the columns of such a place those of a delay less its error `x`: ``-tau`` of velocity, ``v - tau a`` of the delay."""
+    if lag >= 0 and H[2, _DP + 2] != 0.0 and H[2, lag] != 0.0:
+        for i in range(3):
+            for j in range(3):
+                H[i, _DV + j] -= H[i, _DP + j] * x[lag]
+                H[i, lag] -= H[i, _DP + j] * now[NOW_PUSH + j] * x[lag]

@@ -32,7 +32,7 @@ from truenorth.estimate.correct import (
     touched,
     update_held,
 )
-from truenorth.estimate.late import keep_moment, show
+from truenorth.estimate.late import as_it_moves, as_late_as_known, keep_moment
 from truenorth.estimate.memory import (
     ABSENT,
     DISTURB,
@@ -106,11 +106,11 @@ def correct(
     With `exact` its innovations are those of `room.z`.
     """
     source, now, R = events.source[k], room.now, room.R
-    if model.opened and exact != (m.shown[0] > 0.0):
-        show(m, model, exact, w)
     for a in range(3):
         R[a] = events.variance[k, a]
     measure(m, model, sources, source, events.measured[k], now, w, R)
+    if model.opened and not exact:
+        as_it_moves(model.lag, m.x, w.H)
     arm_turned(sources.states[source, AT_ARM], m.sums.C_now, w, R)
     if sources.action[source] == PLACE:
         if not np.isnan(w.z[0]):
@@ -125,6 +125,8 @@ def correct(
         elif model.opened:
             for b in range(len(m.x)):
                 w.z[a] -= w.H[a, b] * m.x[b]
+    if model.opened:
+        as_late_as_known(model.lag, m.x, now, w.H)
     kept.when[number] = time
     in_body, lever = along_curve.knows_body(model, m.s, m.aux, w.P), along_curve.lever_now(model, m.s, m.lever, w.P)
     if in_body and sources.over_ground[source]:
@@ -175,12 +177,9 @@ def correct(
         for b in range(len(m.aux)):
             kept.dx[link, b] = w.x[b]
     if model.opened:
-        if exact:
-            keep_moment(m, model, w.x, w)
+        keep_moment(model.lag, w.x, w.P)
         keep_apart(m.x, w.x)
         if time >= model.until:
-            if not exact:
-                keep_moment(m, model, m.x, w)
             feed_back(m.s, m.aux, m.x, model.dynamics.turns)
             set_matrix(m.s, m.sums.C_now)
         return SOUND
@@ -189,7 +188,7 @@ def correct(
     along_curve.reset(m, model, in_body, lever, w)
     if model.invariant >= IN_BODY:
         along_curve.move_lever(m.lever, w.x, sources.over_ground[source], w.P)
-    keep_moment(m, model, w.x, w)
+    keep_moment(model.lag, w.x, w.P)
     feed_back(m.s, m.aux, w.x, model.dynamics.turns)
     set_matrix(m.s, m.sums.C_now)
     return SOUND

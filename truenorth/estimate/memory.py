@@ -141,7 +141,7 @@ class Memory(NamedTuple):
     `P` (n, n) along w; `x` (n,) errors that are known and not fed back, along w: zeros in a closed loop; `largest` (n,) variances
     so far; `sums` since the last event, `means` up to it; `done` (1,) part of the next sample that is taken; `heard` (1,) when the
     vertical loop was fed; `lever` (3,) m, the way from the place about which the vehicle turns with its azimuth, along w, and what
-    that leaves out; `shown` (1,) whether columns are of the motion less the errors `x`; `refused` (S,) rows rejected in a row.
+    that leaves out; `refused` (S,) rows rejected in a row.
     """
 
     s: Array
@@ -154,15 +154,14 @@ class Memory(NamedTuple):
     done: Array
     heard: Array
     lever: Array
-    shown: Array
     refused: Integers
 
     def copy(self) -> Memory:
         """Arrays of its own."""
         sums, means = (Sums(*(a.copy() for a in part)) for part in (self.sums, self.means))
         s, aux, P, x, largest = (a.copy() for a in self[:5])
-        done, heard, lever, shown = (a.copy() for a in self[7:11])
-        return Memory(s, aux, P, x, largest, sums, means, done, heard, lever, shown, self.refused.copy())
+        done, heard, lever = (a.copy() for a in self[7:10])
+        return Memory(s, aux, P, x, largest, sums, means, done, heard, lever, self.refused.copy())
 
 
 def memory(s: Array, aux: Array, P: Array, begin: float, sources: int, x: Array | None = None) -> Memory:
@@ -181,6 +180,5 @@ def memory(s: Array, aux: Array, P: Array, begin: float, sources: int, x: Array 
         np.zeros(1),
         np.array([begin]),
         np.append(lever_of(P), 0.0),
-        np.zeros(1),
         np.zeros(sources, dtype=np.int64),
     )
