@@ -20,7 +20,7 @@ from truenorth.errors.model import InsModel
 from truenorth.errors.whole_bias import taken_apart
 from truenorth.estimate import loop as kernel
 from truenorth.estimate.axes import turn
-from truenorth.estimate.events import LoopState, Rows, Setting, planned, received
+from truenorth.estimate.events import LoopState, Rows, Setting, lag_of_fixes, planned, received
 from truenorth.estimate.memory import (
     ABSENT,
     AHEAD,
@@ -260,7 +260,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         setting.open_until is not None,
         setting.open_until or 0.0,
         setting.exact,
-        _lag_of_fixes(sources, model),
+        lag_of_fixes(setting),
     )
     seen = kernel_sources(sources, model)
     task = Task(state.samples, state.taken, Events(*plan), Events(*late), seen, of_model, horizon)
@@ -289,14 +289,6 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
     if setting.covariance:
         turn(C_nw, v_n, position, 1.0, P)
     return after, Track(kept.time[:outputs], C_nb, v_n, position, sensors, P, model.layout, residuals)
-
-
-def _lag_of_fixes(sources: Sequence[Aiding], model: InsModel) -> int:
-    """The state that is the delay of places over the ground; -1: none."""
-    for source in sources:
-        if source.row.over_ground and source.row.unit == "m" and "lag" in source.states and not source.retimed:
-            return model.layout.first_of(source.states["lag"].name)
-    return -1
 
 
 def _nothing(model: InsModel, sources: Sequence[Aiding]) -> Track:

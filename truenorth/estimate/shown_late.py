@@ -5,17 +5,20 @@ shows of when it pushes. What fixes tell is therefore
 
     eta = dp + v dtau
 
-and not either of the two. The column of the delay is the latest velocity. Once a correction has taken ``x_v`` off that, ``eta`` is
-no more what was known: the column has a step that nothing has pushed, and the next fix seems to show how late it is, by the noise of
-the one before. Of a robot that does 1 m/s, with a consumer IMU and fixes of a metre, most of what the filter knew of a delay was of
-that kind. And errors of fixes that last, alike from row to row, led the delay away, pass by pass: by twenty of its sigmas. So errors
-are carried over a correction such that ``eta`` stays,
+and not either of the two. The column of the delay is the latest velocity. Once a correction has taken ``x_v`` off that, ``eta``
+is no more what was known: the column has a step that nothing has pushed, and the next fix seems to show how late it is, by the
+noise of the one before. Of a robot that does 1 m/s, with a consumer IMU and fixes of a metre, most of what the filter knew of a
+delay was of that kind. Errors of fixes that last, alike from row to row, led it away, pass by pass, by twenty of its sigmas. So
+errors are carried over a correction such that ``eta`` stays,
 
     dp <- dp + (v_before - v_after) dtau
 
-What is known of velocity stays as it is: a vehicle that stands shows it undelayed. (The same with ``dv + a dtau`` gave a delay of
-which zero velocities knew .03 s.) In an open loop (:mod:`truenorth.estimate.apart`) columns are of the motion that it is linear
-about as long as heading is any, and of the motion less its known errors from then on: that is a step of the column, too.
+What is known of velocity stays as it is: a vehicle that stands shows it undelayed. (With ``dv <- dv + (a_before - a_after) dtau``
+as well, zero velocities at rest seemed to show a delay to .03 s.)
+
+An open loop (:mod:`truenorth.estimate.apart`) is linear about a motion that drifts away from what is known, with velocities that
+tilts have made. The column of the delay is of the velocity and the delay that are known there, from the first row on, and so are
+``-tau`` in that of velocity and ``-tau a`` in that of the delay: as if what is known were fed back.
 
 Source: G. Huang, A. Mourikis and S. Roumeliotis, "Observability-based rules for designing consistent EKF SLAM estimators", Int. J.
 Robotics Research 29 (2010): what nothing shows must be the same from row to row. The rule for a delay is ours.
@@ -61,3 +64,11 @@ def as_late_as_known(lag: int, x: Any, now: Any, H: Any) -> None:
             for j in range(3):
                 H[i, _DV + j] -= H[i, _DP + j] * x[lag]
                 H[i, lag] -= H[i, _DP + j] * now[NOW_PUSH + j] * x[lag]
+
+
+@borrowing(forceinline=True)
+def keep_link(lag: int, x: Any, D: Any) -> None:
+    """Fill in `D` (n, n), by which :func:`keep_moment` carries errors."""
+    if lag >= 0:
+        for i in range(3):
+            D[_DP + i, lag] += x[_DV + i]
