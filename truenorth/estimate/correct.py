@@ -12,7 +12,7 @@ from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_
 from truenorth.core.compiled import borrowing
 from truenorth.core.linalg import dot_at
 from truenorth.errors.invariant import rotation_vector_of
-from truenorth.estimate.memory import Memory, Model, Sources
+from truenorth.estimate.memory import Events, Memory, Model, Sources
 from truenorth.filters.recursion import (
     NO_INNOVATION_VARIANCE,
     NOT_POSITIVE,
@@ -234,3 +234,11 @@ def set_place(size: Any, m: Memory, now: Any, variance: Any, w: Any) -> None:
             w.P[j, _DP + i] = 0.0
         w.P[_DP + i, _DP + i] = variance[i]
         m.x[_DP + i] = 0.0
+
+
+@borrowing
+def disturb(of: Events, e: int, P: Any) -> None:
+    """Add what the base may have done in a gap to the variances of attitude and velocity."""
+    for a in range(3):
+        P[_PHI + a, _PHI + a] += of.variance[e, a]
+        P[_DV + a, _DV + a] += of.measured[e, a]

@@ -149,3 +149,11 @@ def _reached(state: LoopState) -> float:
     if state.taken < len(state.samples.end) and done > 0.0:
         return float(state.samples.end[state.taken] - (1.0 - done) * state.samples.step[state.taken])
     return float(state.samples.end[state.taken - 1]) if state.taken else state.begin
+
+
+def lag_of_fixes(setting: Setting) -> int:
+    """The state that is the delay of places over the ground; -1: there is none."""
+    for source in setting.sources:
+        if source.row.over_ground and source.row.unit == "m" and "lag" in source.states:
+            return setting.model.layout.first_of(source.states["lag"].name)
+    return -1

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from truenorth.aiding.row import AT_ARM, AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
-from truenorth.estimate import along_curve
+from truenorth.estimate import along_curve, shown_late
 from truenorth.estimate.apart import innovations_there, is_exact
 from truenorth.estimate.correct import (
     arm_turned,
     damp_height,
+    disturb,
     feed_back,
     joint_nis,
     keep_apart,
@@ -100,14 +101,13 @@ def correct(
     link: int,
     exact: bool,
 ) -> int:
-    """Take event k, a measurement; `number` is its place in the histories. The failure, if any.
-
-    With `exact` its innovations are those of `room.z`.
-    """
+    """Take event k, a measurement, `number` in the histories; with `exact` its innovations are `room.z`. The failure, if any."""
     source, now, R = events.source[k], room.now, room.R
     for a in range(3):
         R[a] = events.variance[k, a]
     measure(m, model, sources, source, events.measured[k], now, w, R)
+    if model.opened and not exact:
+        shown_late.as_it_moves(model.lag, m.x, w.H)
     arm_turned(sources.states[source, AT_ARM], m.sums.C_now, w, R)
     if sources.action[source] == PLACE:
         if not np.isnan(w.z[0]):
@@ -122,6 +122,8 @@ def correct(
         elif model.opened:
             for b in range(len(m.x)):
                 w.z[a] -= w.H[a, b] * m.x[b]
+    if model.opened:
+        shown_late.as_late_as_known(model.lag, m.x, now, w.H)
     kept.when[number] = time
     in_body, lever = along_curve.knows_body(model, m.s, m.aux, w.P), along_curve.lever_now(model, m.s, m.lever, w.P)
     if in_body and sources.over_ground[source]:
@@ -172,6 +174,7 @@ def correct(
         for b in range(len(m.aux)):
             kept.dx[link, b] = w.x[b]
     if model.opened:
+        shown_late.keep_moment(model.lag, w.x, w.P)
         keep_apart(m.x, w.x)
         if time >= model.until:
             feed_back(m.s, m.aux, m.x, model.dynamics.turns)
@@ -182,6 +185,9 @@ def correct(
     along_curve.reset(m, model, in_body, lever, w)
     if model.invariant >= IN_BODY:
         along_curve.move_lever(m.lever, w.x, sources.over_ground[source], w.P)
+    shown_late.keep_moment(model.lag, w.x, w.P)
+    if smoothing:
+        shown_late.keep_link(model.lag, w.x, kept.D[link])
     feed_back(m.s, m.aux, w.x, model.dynamics.turns)
     set_matrix(m.s, m.sums.C_now)
     return SOUND
@@ -217,14 +223,6 @@ def keep_link(kept: Kept, link: int, n: int, Phi: Any, Q: Any) -> None:
         for b in range(len(Phi)):
             Phi[a, b] = 1.0 * (a == b)
             Q[a, b] = 0.0
-
-
-@borrowing
-def disturb(of: Events, e: int, P: Any) -> None:
-    """Add what the base may have done in a gap to the variances of attitude and velocity."""
-    for a in range(3):
-        P[_PHI + a, _PHI + a] += of.variance[e, a]
-        P[_DV + a, _DV + a] += of.measured[e, a]
 
 
 @borrowing(forceinline=True)

@@ -67,7 +67,8 @@ class Model(NamedTuple):
     """What of the error model the kernel needs.
 
     `spare` (s): an event of the grid so soon after another is passed over; `opened`: no correction is fed back before `until` (s);
-    `exact`: innovations are those of the motion with its errors taken off (:mod:`truenorth.estimate.apart`).
+    `exact`: innovations are those of the motion with its errors taken off (:mod:`truenorth.estimate.apart`). `lag`: the delay of
+    fixes, or -1.
     """
 
     dynamics: Dynamics
@@ -83,6 +84,7 @@ class Model(NamedTuple):
     opened: bool = False
     until: float = 0.0
     exact: bool = False
+    lag: int = -1
 
 
 class Task(NamedTuple):

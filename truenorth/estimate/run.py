@@ -20,7 +20,7 @@ from truenorth.errors.model import InsModel
 from truenorth.errors.whole_bias import taken_apart
 from truenorth.estimate import loop as kernel
 from truenorth.estimate.axes import turn
-from truenorth.estimate.events import LoopState, Rows, Setting, planned, received
+from truenorth.estimate.events import LoopState, Rows, Setting, lag_of_fixes, planned, received
 from truenorth.estimate.memory import (
     ABSENT,
     AHEAD,
@@ -260,6 +260,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         setting.open_until is not None,
         setting.open_until or 0.0,
         setting.exact,
+        lag_of_fixes(setting),
     )
     seen = kernel_sources(sources, model)
     task = Task(state.samples, state.taken, Events(*plan), Events(*late), seen, of_model, horizon)
