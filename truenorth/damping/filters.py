@@ -83,6 +83,20 @@ class FixRows(NamedTuple):
     z: Array
     sigma: Array
 
+    @staticmethod
+    def rows(states: int) -> Array:
+        """(3, n) what a fix shows of this many states."""
+        H = np.zeros((3, states))
+        H[:2, DP], H[2, PHI.stop - 1] = np.eye(2), 1.0
+        return H
+
+    def sigma_of_steps(self, stride: int, count: int) -> Array:
+        """(count, 3) of all fixes within each step of `stride` epochs, weighed together; infinite where there is none."""
+        information = np.where(np.isfinite(self.z), self.sigma**-2.0, 0.0)[1 : 1 + count * stride]
+        with np.errstate(divide="ignore"):
+            sigma: Array = information.reshape(count, stride, 3).sum(axis=1) ** -0.5
+        return sigma
+
 
 @dataclass(frozen=True)
 class Filter:
@@ -221,8 +235,7 @@ class _Stream:
         fixes, own = self.kind.fixes, slice(self.done, self.done + len(z))
         if fixes is None:
             return z, H, R
-        rows = np.zeros((3, self.kind.model.states))
-        rows[:2, DP], rows[2, PHI.stop - 1] = np.eye(2), 1.0
+        rows = fixes.rows(self.kind.model.states)
         R = np.zeros((len(z), 5, 5))
         R[:, :2, :2] = self.kind.sigma**2 * np.eye(2)
         R[:, range(2, 5), range(2, 5)] = fixes.sigma[own] ** 2
