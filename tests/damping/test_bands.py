@@ -89,7 +89,8 @@ def test_bands_of_a_filter_with_fixes_are_its_own(course, stands):
     bands = filter_bands(course, kind, kind, absent=absent).errors
     np.testing.assert_allclose(bands[SETTLED::STEP], own[SETTLED::STEP], rtol=0.1)
     assert np.all(bands[SETTLED:] > 0.9 * own[SETTLED:])
-    assert np.all(own[700, DP] < 0.7 * own[699, DP]) and np.all(own[910, DP] < 0.7 * own[900, DP])
+    assert np.all(own[700, DP] < 0.7 * own[699, DP])
+    assert np.all(own[910, DP] < 0.7 * own[900, DP])
     assert own[1210, PHI][2] < 0.9 * own[1200, PHI][2]
 
 
@@ -104,4 +105,5 @@ def test_a_fix_is_as_good_as_its_sigma_by_every_reading_of_the_log(course, whole
     np.testing.assert_allclose(bands[:890], without[:890], rtol=1e-12)
     assert np.all(without[900] > 5.0)
     np.testing.assert_allclose(bands[900], 0.5, rtol=0.02)
-    assert np.all(bands[891:900] >= bands[890]) and np.all(bands[901:] < without[901:])
+    assert np.all(bands[891:900] >= bands[890])
+    assert np.all(bands[901:] < without[901:])

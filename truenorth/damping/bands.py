@@ -166,7 +166,9 @@ def filter_bands(
         B[:, x1], G[:, x1] = first.gain @ H, first.gain
         if two is not None and P2 is not None:
             R2 = two.sigma**2 / (stride if two.overlap else 1) * np.eye(2)[None]
-            second, P2 = _gains(Phi1, Q1, F1[:, DV, : two.model.states], R2, np.repeat(silent[rows, None], 2, axis=1), P2)
+            second, P2 = _gains(
+                Phi1, Q1, F1[:, DV, : two.model.states], R2, np.repeat(silent[rows, None], 2, axis=1), P2
+            )
             K2 = second.gain / part.interval
             A[:, x2], B[:, x2], G[:, x2] = K2 @ A[:, v1], K2 @ B[:, v1], K2 @ G[:, v1]
             A[:, x2, x2] += second.step
