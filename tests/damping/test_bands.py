@@ -8,7 +8,8 @@ import pytest
 from tests.damping.marine_case import ideal_and_truth
 from tests.damping.test_filters import SIGMA, WALKS, reference
 from truenorth.damping.bands import filter_bands, network_bands
-from truenorth.damping.filters import Filter, FixRows, run_filters
+from truenorth.damping.filters import Filter, run_filters
+from truenorth.damping.fix_rows import FixRows
 from truenorth.damping.loop import Loop
 from truenorth.damping.networks import NO_NETWORK, second_order
 from truenorth.errors.log import LogErrors

@@ -62,9 +62,9 @@ class Found:
 class _Steps:
     """From pass to pass the noise of the rows moves to what was fitted, by half as much from there on where it goes to and fro.
 
-    What the filter's own state has of the innovations is taken off them, and is as large as the noise it was given: of a noise taken
-    for too large too much is left off, and the next is too small. In a short log it went from 2 m to .1 m and back for ever, and by
-    .1 m the gate rejected half of the rows.
+    What the filter's own state has of the innovations is taken off them, and is as large as the noise that it was given: where that
+    is too large, too much is taken off, and the next noise is too small. In a short log it went from 2 m to .1 m and back for ever;
+    by .1 m the gate rejected half of the rows.
     """
 
     def __init__(self) -> None:

@@ -20,15 +20,15 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import intervals, without_errors
+from truenorth.damping.fix_rows import FixRows
 from truenorth.errors.log import log_rows
-from truenorth.errors.marine import DP, DV, MOTION, PHI, STATES, MarineModel
+from truenorth.errors.marine import DV, MOTION, PHI, STATES, MarineModel
 from truenorth.filters import Estimates, FilterState, LinearSystem, gated, kalman
 from truenorth.state.track import Track
 
@@ -75,27 +75,6 @@ class Estimate:
     def rejected(self) -> int:
         """Measurements that the gate kept out."""
         return int(np.sum(self.used == 0.0))
-
-
-class FixRows(NamedTuple):
-    """Fixes at the epochs from the switch on: place error east, north (m), heading error (rad), (K+1-start, 3), NaN where none."""
-
-    z: Array
-    sigma: Array
-
-    @staticmethod
-    def rows(states: int) -> Array:
-        """(3, n) what a fix shows of this many states."""
-        H = np.zeros((3, states))
-        H[:2, DP], H[2, PHI.stop - 1] = np.eye(2), 1.0
-        return H
-
-    def sigma_of_steps(self, stride: int, count: int) -> Array:
-        """(count, 3) of all fixes within each step of `stride` epochs, weighed together; infinite where there is none."""
-        information = np.where(np.isfinite(self.z), self.sigma**-2.0, 0.0)[1 : 1 + count * stride]
-        with np.errstate(divide="ignore"):
-            sigma: Array = information.reshape(count, stride, 3).sum(axis=1) ** -0.5
-        return sigma
 
 
 @dataclass(frozen=True)
