@@ -1,5 +1,7 @@
 """Bands of a log that is sparse or falls silent: at rows that come between the epochs of the covariances, and without any."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,10 +9,11 @@ from tests.damping.marine_case import ideal_and_truth
 from tests.damping.test_filters import SIGMA, WALKS, reference
 from truenorth.damping.bands import filter_bands, network_bands
 from truenorth.damping.filters import Filter, run_filters
+from truenorth.damping.fix_rows import FixRows
 from truenorth.damping.loop import Loop
 from truenorth.damping.networks import NO_NETWORK, second_order
 from truenorth.errors.log import LogErrors
-from truenorth.errors.marine import MarineModel
+from truenorth.errors.marine import DP, PHI, MarineModel
 
 STEP = 10  # epochs between the covariances of a course of 1 Hz
 FIRST = 3  # epoch of the log's first row: no covariance stands there
@@ -71,3 +74,37 @@ def test_a_network_takes_the_noise_of_the_rows_that_there_are(course, whole):
     ends = np.stack([many.errors[:-STEP:STEP], many.errors[STEP::STEP]])
     np.testing.assert_allclose(few.errors[4:-1:STEP], ends.max(axis=0), rtol=1e-9)
     np.testing.assert_allclose(many.errors[4:-1:STEP], 0.6 * ends[0] + 0.4 * ends[1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("stands", [True, False])
+def test_bands_of_a_filter_with_fixes_are_its_own(course, stands):
+    """Places and an azimuth, two in one step, and one at an epoch of the covariances: they come down at a fix as its own do."""
+    z, size = np.full((len(course), 3), np.nan), np.ones((len(course), 3))
+    z[[700, 905, 907], :2], size[[700, 905, 907], :2] = 0.0, np.array([50.0, 20.0, 30.0])[:, None]
+    z[1203, 2], size[1203, 2] = 0.0, 1e-4
+    absent = sparse(course) if stands else np.ones(len(course), dtype=bool)
+    kind = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05, fixes=FixRows(z, size))
+    rows = reference(course, 0.0)
+    rows[absent] = np.nan
+    own = run_filters(course, rows, start=0, kinds={"one": kind})["one"].sigma[:, :7]
+    bands = filter_bands(course, kind, kind, absent=absent).errors
+    np.testing.assert_allclose(bands[SETTLED::STEP], own[SETTLED::STEP], rtol=0.1)
+    assert np.all(bands[SETTLED:] > 0.9 * own[SETTLED:])
+    assert np.all(own[700, DP] < 0.7 * own[699, DP])
+    assert np.all(own[910, DP] < 0.7 * own[900, DP])
+    assert own[1210, PHI][2] < 0.9 * own[1200, PHI][2]
+
+
+def test_a_fix_is_as_good_as_its_sigma_by_every_reading_of_the_log(course, whole):
+    """A drift that the filter takes to be faster than it is changes what it makes of the log, not where a sharp fix leaves it."""
+    z, size = np.full((len(course), 3), np.nan), np.full((len(course), 3), 0.5)
+    z[900, :2] = 0.0
+    fast = MarineModel(**WALKS, groups=LogErrors(0.3, 600.0).groups())
+    kind = Filter(fast, fast.prior(np.diag(SIGMA**2)), 0.05, fixes=FixRows(z, size))
+    bands = filter_bands(course, whole, kind, absent=sparse(course)).errors[:, DP]
+    without = filter_bands(course, whole, replace(kind, fixes=None), absent=sparse(course)).errors[:, DP]
+    np.testing.assert_allclose(bands[:890], without[:890], rtol=1e-12)
+    assert np.all(without[900] > 5.0)
+    np.testing.assert_allclose(bands[900], 0.5, rtol=0.02)
+    assert np.all(bands[891:900] >= bands[890])
+    assert np.all(bands[901:] < without[901:])

@@ -14,7 +14,8 @@ from truenorth.core.errors import UsageError
 from truenorth.damping.bands import filter_bands
 from truenorth.damping.course import linearised, without_errors
 from truenorth.damping.drift import likely_drifts
-from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
+from truenorth.damping.filters import Filter, Fusion, run_filters
+from truenorth.damping.fix_rows import FixRows
 from truenorth.damping.navigation import change_filter
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
 from truenorth.errors.marine import BA, BG, DP, PHI, MarineModel

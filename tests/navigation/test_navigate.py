@@ -145,6 +145,29 @@ def test_height_from_a_barometer_and_from_nothing(drive):
     assert np.isfinite(free.v_sigma).all()
 
 
+def test_a_barometer_of_another_level_has_no_good_status(drive):
+    """Its first rows were rejected, and taken once the height had drifted to where it counts from."""
+    motion, record, start = drive
+    time = np.arange(0.2, 179.0)
+    rough = replace(start, P=start.P + np.diag(np.arange(15) == 8) * 60.0**2)
+    high = Barometer(HeightRecord(time, motion.states(time).alt + 120.0))
+    gnss = Gnss(fixes(motion, time), Mounting())
+    asked = {"imu": SPEC, "altitude": "baro", "check_clocks": False}
+    alone, both, wide = (
+        navigate(record, begin, aid=aid, **asked)
+        for begin, aid in (
+            (start, high),
+            (rough, [high, gnss]),
+            (rough, [replace(high, mounting=Mounting(bias_sigma=60.0, bias_time=3600.0)), gnss]),
+        )
+    )
+    assert alone.status == both.status == "inconsistent"
+    assert any(e.key == "height.first" and e.figures["apart"] == pytest.approx(120.0, abs=1.0) for e in alone.evidence)
+    assert any(e.key == "height.apart" and e.figures["apart"] == pytest.approx(120.0, abs=1.0) for e in both.evidence)
+    assert both.position[-1, 2] - start.alt > 100.0  # as high as the barometer says, without a row that is rejected
+    assert wide.status == "navigated"
+
+
 def test_stops_are_found_where_the_car_stands_and_nowhere_else(drive):
     _, record, start = drive
     result = navigate(record, start, imu=SPEC, altitude="fixed", zupt="auto")

@@ -45,6 +45,7 @@ def refused(check, *arguments):
         (lambda r: {"lat": r.lat + 0.01}, ["align with `lat` 48.57", "`lon` 11.00", "64 km"]),
         (lambda r: {"alt": r.alt - PLACE.alt}, ["column alt: 4", "from 500.0 m", "`alt` 4"]),
         (lambda r: {"alt": -r.alt}, ["counted downwards", "depth"]),
+        (lambda r: {"alt": r.alt / 0.3048}, ["times 0.3048 they fit", "3.28", "metres"]),
     ],
 )
 def test_a_track_from_elsewhere_says_what_it_looks_like(change, words):

@@ -276,6 +276,11 @@ def place_sigma(record: GnssRecord) -> float:
     return float(np.median(sigma)) if sigma.size else float(POSITION_SIGMA[0])
 
 
+def height_sigma(record: GnssRecord) -> Array:
+    """(M,) what a receiver says of its heights, m; usual where it says nothing."""
+    return _position_sigma(record, POSITION_SIGMA)[:, 2]
+
+
 def place_axes(record: GnssRecord) -> Array:
     """(3,) sigma of a receiver's slow errors east, north, up by that of its places."""
     return _axes(_position_sigma(record, POSITION_SIGMA)[record.has_position])

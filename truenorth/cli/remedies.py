@@ -28,6 +28,7 @@ OPTIONS = {
     "arm.odometer": "--wheel-arm",
     "arm.velocity": "--wheel-arm",
     "height_sensor": "--altitude free",
+    "level.apart": "--altitude gnss",
     "use_barometer": "--altitude baro",
     "part_of_logs": "--from, --to",
     "without_jump": "--from, --to",

@@ -10,6 +10,8 @@ change of what filter 1 smooths over a step for filter 2,
 and the bands are those of ``x1 - e``. The fusion's error is ``x2 - e + w (x1 - x2)``, in which the difference of the filters is
 known: where filter 1 is far off, they differ and its weight is small. Its bands are of the error given that difference.
 
+A fix from outside is a row of filter 1 as the log's are: ``H`` shows place and heading of ``e``, ``n`` is the fix's own error.
+
 Source: R. Brown, P. Hwang, *Introduction to Random Signals and Applied Kalman Filtering*, 4th ed. (2012), sec. 5.7 (suboptimal
 filters); J. Farrell, M. Barth, *The Global Positioning System and Inertial Navigation* (1999), sec. 4.10 (covariance analysis).
 """
@@ -117,7 +119,7 @@ def filter_bands(
     whole : Filter
         All errors of INS and log, as in :func:`network_bands`.
     one, two : Filter
-        As they run.
+        As they run, filter 1 with its fixes.
     fused : (weight, difference), optional
         Of filters 1 and 2: (K+1, 7) the weight of filter 1, and by how much its estimate differs from filter 2's.
     absent : (K+1,) array of bool, optional
@@ -136,7 +138,8 @@ def filter_bands(
     absent = np.zeros(len(course), dtype=bool) if absent is None else absent
     silent = silences(absent, max(1, round(SETTLING / course.interval)))[::stride]
     many = _rows_in_steps(np.where(absent[1:], 0.0, 1.0), stride, len(coarse) - 1)
-    R1 = one.sigma**2 / np.maximum(many, 1.0)[:, None, None] * np.eye(2)
+    seen1, R1 = _rows_of_one(one, many, stride)
+    fixed = seen1[:, 2:].any(axis=1)
     # Until filter 1 has settled nothing goes into filter 2.
     silent = silent | (np.arange(-1, len(coarse) - 1) * coarse.interval < SETTLING - 1e-6)
     share, apart = (None, None) if fused is None else (fused[0][::stride], fused[1][::stride])
@@ -152,18 +155,20 @@ def filter_bands(
         rows, steps = slice(begin + 1, begin + len(part)), slice(begin, begin + len(part) - 1)
         mean = 0.5 * (part.v_n[1:] + part.v_n[:-1])
         _, Phi = linearised(part, whole.model)
-        Q, H = np.broadcast_to(whole.model.noise_of(part.interval, mean), Phi.shape), whole.rows(part)
+        Q, H = np.broadcast_to(whole.model.noise_of(part.interval, mean), Phi.shape), _with_fixes(whole, one, part)
         F1, Phi1 = linearised(part, one.model)
-        Q1, H1 = one.model.noise_of(part.interval, mean)[:1], one.rows(part)
-        first, P1 = _gains(Phi1, Q1, H1, R1[steps], many[steps] == 0.0, P1)
-        A, G = np.zeros((len(part) - 1, count, count)), np.zeros((len(part) - 1, count, 2))
+        Q1, H1 = one.model.noise_of(part.interval, mean)[:1], _with_fixes(one, one, part)
+        first, P1 = _gains(Phi1, Q1, H1, R1[steps], ~seen1[steps], P1)
+        A, G = np.zeros((len(part) - 1, count, count)), np.zeros((len(part) - 1, count, H.shape[1]))
         B = np.zeros((len(part) - 1, count, n))  # of the noise that drives the errors
         A[:, e, e], B[:, e] = Phi, np.eye(n)
         A[:, x1, e], A[:, x1, x1] = first.gain @ H @ Phi, first.step
         B[:, x1], G[:, x1] = first.gain @ H, first.gain
         if two is not None and P2 is not None:
             R2 = two.sigma**2 / (stride if two.overlap else 1) * np.eye(2)[None]
-            second, P2 = _gains(Phi1, Q1, F1[:, DV, : two.model.states], R2, silent[rows], P2)
+            second, P2 = _gains(
+                Phi1, Q1, F1[:, DV, : two.model.states], R2, np.repeat(silent[rows, None], 2, axis=1), P2
+            )
             K2 = second.gain / part.interval
             A[:, x2], B[:, x2], G[:, x2] = K2 @ A[:, v1], K2 @ B[:, v1], K2 @ G[:, v1]
             A[:, x2, x2] += second.step
@@ -172,7 +177,7 @@ def filter_bands(
         joints = _covariances(A, driven, joint)[1:]
         joint = joints[-1]
         seen = np.repeat(off[None, DV], len(part) - 1, axis=0)
-        seen[:, :, e] = -H  # x - (dv - d): the residual's slow part
+        seen[:, :, e] = -H[:, :2]  # x - (dv - d): the residual's slow part
         errors[rows], residual[rows] = _variances(off, joints), _variances(seen, joints)
         if share is not None and apart is not None:
             differs[:, x2.start : x2.start + MOTION.stop] = -np.eye(MOTION.stop)
@@ -181,7 +186,28 @@ def filter_bands(
             with_log = _variances(seen, joints, differs[DV])
             residual[rows] = _given(residual[rows], with_log, *(column[:, DV] for column in known))
     residual[1:] += whole.sigma**2
-    return _spread(course, coarse, errors, residual, many)
+    return _spread(course, coarse, errors, residual, np.where(fixed, 0.0, many))
+
+
+def _with_fixes(kind: Filter, one: Filter, part: Track) -> Array:
+    """(K, m, n) what the log shows of this filter's states, and behind it, where filter 1 has fixes at all, what those show."""
+    H = kind.rows(part)
+    if one.fixes is None:
+        return H
+    rows = one.fixes.rows(kind.model.states)
+    return np.concatenate([H, np.broadcast_to(rows, (len(H), *rows.shape))], axis=1)
+
+
+def _rows_of_one(one: Filter, many: Array, stride: int) -> tuple[NDArray[np.bool_], Array]:
+    """(K, m) which rows filter 1 has in each coarse step, `many` of the log among them, and (K, m, m) their noise."""
+    seen = np.repeat(many[:, None] > 0.0, 2, axis=1)
+    variance = np.repeat((one.sigma**2 / np.maximum(many, 1.0))[:, None], 2, axis=1)
+    if one.fixes is not None:
+        of_fixes = one.fixes.sigma_of_steps(stride, len(many))
+        there = np.isfinite(of_fixes)
+        seen = np.concatenate([seen, there], axis=1)
+        variance = np.concatenate([variance, np.where(there, of_fixes, 1.0) ** 2], axis=1)
+    return seen, variance[:, :, None] * np.eye(seen.shape[1])
 
 
 def _rows_in_steps(there: Array, stride: int, count: int) -> Array:
@@ -205,8 +231,8 @@ def _variances(H: Array, P: Array, other: Array | None = None) -> Array:
 
 
 def _gains(Phi: Array, Q: Array, H: Array, R: Array, absent: NDArray[np.bool_], P: Array) -> tuple[Gains, Array]:
-    """Of a filter's updates at these epochs, and its covariance after them."""
-    z = np.where(absent[:, None], np.nan, np.zeros(2))
+    """Of a filter's updates at these epochs, (K, m) of its rows absent, and its covariance after them."""
+    z = np.where(absent, np.nan, 0.0)
     system = LinearSystem(Phi, Q, H, R, z, np.zeros(len(P)), P)
     found = kalman(system, history="full")
     return filter_gains(system, found), np.asarray(found.P[-1])
@@ -222,9 +248,10 @@ def _given(variance: Array, covariance: Array, weight: Array, apart: Array, spre
 
 
 def _spread(course: Track, coarse: Track, errors: Array, residual: Array, rows: Array) -> Bands:
-    """Roots of these variances, at all epochs of the course; `rows` (K,) of the log in each coarse step.
+    """Roots of these variances, at all epochs of the course; `rows` (K,) of the log in each coarse step, none where a fix is.
 
-    Where in a step the first of few rows comes, and moves the velocity, the step does not say: it has the larger of its ends.
+    Where in a step the first of few rows comes, and moves the velocity, the step does not say: it has the larger of its ends. So
+    with a fix.
     """
     stride = max(1, round(coarse.interval / course.interval))
     after = np.minimum(-(-np.arange(len(course)) // stride), len(coarse) - 1)

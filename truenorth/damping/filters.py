@@ -20,15 +20,15 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import intervals, without_errors
+from truenorth.damping.fix_rows import FixRows
 from truenorth.errors.log import log_rows
-from truenorth.errors.marine import DP, DV, MOTION, PHI, STATES, MarineModel
+from truenorth.errors.marine import DV, MOTION, PHI, STATES, MarineModel
 from truenorth.filters import Estimates, FilterState, LinearSystem, gated, kalman
 from truenorth.state.track import Track
 
@@ -75,13 +75,6 @@ class Estimate:
     def rejected(self) -> int:
         """Measurements that the gate kept out."""
         return int(np.sum(self.used == 0.0))
-
-
-class FixRows(NamedTuple):
-    """Fixes at the epochs from the switch on: place error east, north (m), heading error (rad), (K+1-start, 3), NaN where none."""
-
-    z: Array
-    sigma: Array
 
 
 @dataclass(frozen=True)
@@ -221,8 +214,7 @@ class _Stream:
         fixes, own = self.kind.fixes, slice(self.done, self.done + len(z))
         if fixes is None:
             return z, H, R
-        rows = np.zeros((3, self.kind.model.states))
-        rows[:2, DP], rows[2, PHI.stop - 1] = np.eye(2), 1.0
+        rows = fixes.rows(self.kind.model.states)
         R = np.zeros((len(z), 5, 5))
         R[:, :2, :2] = self.kind.sigma**2 * np.eye(2)
         R[:, range(2, 5), range(2, 5)] = fixes.sigma[own] ** 2

@@ -28,7 +28,8 @@ from truenorth.damping.answer import (
 from truenorth.damping.bands import filter_bands, network_bands, widest
 from truenorth.damping.course import motion_at, place_at, without_errors
 from truenorth.damping.drift import likely_drifts
-from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
+from truenorth.damping.filters import Filter, Fusion, run_filters
+from truenorth.damping.fix_rows import FixRows
 from truenorth.damping.log_arm import at_the_imu
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, first_order, second_order

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
+from truenorth.aiding.aids import Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.alignment.rest_shift import shift_evidence
 from truenorth.core.errors import UsageError
@@ -61,6 +61,7 @@ from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
+from truenorth.quality.heights import level_evidence
 from truenorth.quality.held import as_sampled
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
@@ -306,6 +307,9 @@ def _seen(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec) -> 
     receiver = record_of(given, Gnss)
     evidence += [] if receiver is None else gnss_evidence(receiver)
     evidence += shift_evidence(plan.record, spec, track, *logs_of_speed(given))
+    if plan.altitude == "baro" and isinstance(barometer := given.get(Barometer.key), Barometer):
+        heights = given.get(Gnss.key)
+        evidence += level_evidence(barometer, heights if isinstance(heights, Gnss) else None, track)
     unused = "baro" in given and plan.altitude != "baro"
     return [*evidence, *([note("height.barometer_unused", "use_barometer", altitude=plan.altitude)] if unused else [])]
 

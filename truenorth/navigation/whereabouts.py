@@ -25,6 +25,7 @@ FIXES = 5  # of the log's beginning that are looked at, by their median: one out
 SIGMAS = 6.0
 FASTEST, STEEPEST = 400.0, 30.0  # m/s, of a vehicle between the alignment's epoch and the fix
 LEAST_FAR, LEAST_HIGH = 200.0, 50.0  # m
+FOOT = 0.3048  # m
 CLOSER = 0.01  # of the distance is left where a mistake is undone
 
 
@@ -109,6 +110,12 @@ def _check_heights(
     k = int(np.argsort(off)[known.sum() // 2])  # NaN is sorted behind
     if abs(alt[k] + place.alt) < CLOSER * off[k] + LEAST_HIGH:
         advice = "the heights seem to be counted downwards: name the column depth, or turn its sign"
+    elif (
+        abs(FOOT * alt[k] - place.alt)
+        < CLOSER * off[k] + STEEPEST * passed[k] + SIGMAS * place.vertical_sigma
+        < 0.5 * off[k]
+    ):
+        advice = "times 0.3048 they fit: the heights seem to be in feet (3.28 to a metre); give them in metres"
     else:
         advice = f"align with `alt` {alt[k]:.0f}, or with a `vertical_sigma` that says how rough that is"
     raise DataError(

@@ -270,6 +270,10 @@ SENTENCES = {
     # ---- height
     "height.free": "height is carried on by velocity alone: no sensor of height is given",
     "height.fixed": "height is held fixed, as at sea",
+    "height.apart": "the barometer's heights are {apart:+.0f} m off those of GNSS; one sigma of both together is {sigma:.3g} m",
+    "height.first": (
+        "the barometer's first heights are {apart:+.0f} m off the height of the start; one sigma of both together is {sigma:.3g} m"
+    ),
     "height.barometer_unused": "the barometer is not used: height is {altitude!r}",
     **OF_SENSORS,
 }

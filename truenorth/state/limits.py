@@ -45,6 +45,11 @@ LIMITS: dict[str, Limit] = {
         "sigma of both",
         "two sound answers from one log differ by that much less than once in a hundred, over three axes",
     ),
+    "heights": Limit(
+        4.0,
+        "sigma of both",
+        "two sound heights differ by that much once in 16,000, and an answer by one of them is as far off",
+    ),
     "by chance": Limit(
         2.0, "sigma", "a sound answer is that far off in one of twenty: from there on the excess is in sigma"
     ),

@@ -35,6 +35,14 @@ REMEDIES = {
     "arm.odometer": "check the arm, to the axle that nothing steers; metres are expected",
     "arm.velocity": "check the arm; metres are expected",
     "height_sensor": "give a sensor of height, or let the height be free, where the vehicle climbs",
+    "level.apart": (
+        "set the barometer's pressure at sea level, count both from one level (the sea's or the ellipsoid's), say how far the "
+        "barometer may be off (bias_sigma), or keep the height by GNSS"
+    ),
+    "level.first": (
+        "set the barometer's pressure at sea level, say how far it may be off (bias_sigma), or correct the height of the start"
+    ),
+    "height_in_feet": "times 0.3048 they fit: they are in feet (3.28 to a metre), and metres are expected",
     "use_barometer": "for its heights keep the height by the barometer",
     "part_of_logs": "align a part of the logs",
     "rows_of_one": "align the rows of one sensor",

@@ -1,0 +1,95 @@
+"""Whether a barometer counts heights from the level that the start and the receiver have: its pressure at sea level may not be set.
+
+A barometer's height is off by ``44 330 m * 0.19 dp/p``, some 8.3 m for each hPa by which the pressure at sea level is not the one
+that it has. Within its slow error the filter takes that up. Beyond it the first rows are rejected, until the height has drifted so
+far that one of them passes: from there on height is the barometer's, with the sigma of a sound one. Where the start is not known
+well, no row is rejected at all. So the barometer's heights are held against those of the receiver over the whole log, and its first
+ones against the start's: ``d = h_baro - h``, with the sigma of both. Where most rows are further off than the limit, nobody knows
+which of the two is right.
+
+Source: ICAO Doc 7488, *Manual of the ICAO Standard Atmosphere*, 3rd ed. (1993), for height by pressure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.aids import Barometer, Gnss
+from truenorth.aiding.sensors import BARO_SIGMA, height_sigma, place_axes
+from truenorth.quality.slow_aids import usual_bias
+from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.limits import limit
+from truenorth.state.track import Residuals, Track
+
+Array = NDArray[np.float64]
+
+FOOT = 0.3048  # m
+FEWEST = 5  # rows
+FIRST = 5.0  # s of a barometer's rows that are held against the start
+NEIGHBOURS = 5.0  # s, between fixes: heights in between are on the line from one to the next
+MOST = 0.1  # of the rows may be as near as the sigmas say: an offset is there all the time
+
+
+def level_evidence(barometer: Barometer, receiver: Gnss | None, track: Track) -> list[Evidence]:
+    """That a barometer's heights are another level's, where height is kept by it.
+
+    Parameters
+    ----------
+    barometer : Barometer
+    receiver : Gnss, optional
+        Its heights are not used; they are compared.
+    track : Track
+        With what the barometer's rows said against the prediction.
+
+    Returns
+    -------
+    list of Evidence
+        None, or one: against the receiver's heights, else against the start's.
+    """
+    record, mounting = barometer.record, barometer.mounting or barometer.usual
+    time = record.time - mounting.latency
+    if receiver is not None:
+        other, sigma = _heights_of(receiver, time)
+        noise = BARO_SIGMA if mounting.noise is None else mounting.noise
+        own = noise if record.sigma is None else np.where(np.isfinite(record.sigma), record.sigma, noise)
+        arms = float(np.linalg.norm(mounting.lever_arm))
+        found = _apart("height.apart", record.alt, other, np.sqrt(sigma**2 + own**2 + mounting.slow**2 + arms**2))
+        if found:
+            return found
+    rows = next((r for r in track.residuals if r.name == "barometer"), None)
+    return [] if rows is None else _at_first(rows, time, record.alt)
+
+
+def _heights_of(receiver: Gnss, time: Array) -> tuple[Array, Array]:
+    """Heights of a receiver at these times and their sigma, its slow error and its arm counted; NaN where no fixes are near."""
+    record, mounting = receiver.record, receiver.mounting or receiver.usual
+    there = record.has_position & np.isfinite(record.alt)
+    if there.sum() < FEWEST:
+        return np.full(len(time), np.nan), np.ones(len(time))
+    at = record.time[there] - mounting.latency
+    slow = usual_bias(record) * place_axes(record)[2] if mounting.bias_sigma is None else mounting.bias_sigma
+    arm = float(np.hypot(np.linalg.norm(mounting.lever_arm), mounting.lever_arm_sigma))
+    after = np.clip(np.searchsorted(at, time), 1, len(at) - 1)
+    inside = (time >= at[0]) & (time <= at[-1]) & (at[after] - at[after - 1] <= NEIGHBOURS)
+    sigma = np.sqrt(np.interp(time, at, height_sigma(record)[there]) ** 2 + slow**2 + arm**2)
+    return np.where(inside, np.interp(time, at, record.alt[there]), np.nan), sigma
+
+
+def _at_first(rows: Residuals, time: Array, alt: Array) -> list[Evidence]:
+    """Of the first rows, against what the start and the IMU say."""
+    first = np.arange(len(rows.time)) < max(FEWEST, int(np.sum(rows.time < rows.time[:1] + FIRST)))
+    measured = np.interp(rows.stamp[first], time, alt)
+    return _apart("height.first", measured, measured + rows.innovation[first, 0], rows.sigma[first, 0])
+
+
+def _apart(key: str, measured: Array, other: Array, sigma: Array) -> list[Evidence]:
+    """Evidence that heights are further from others than both can be wrong; `sigma` of both together."""
+    off = measured - other
+    there = np.isfinite(off)
+    if there.sum() < FEWEST or np.quantile(np.abs(off / sigma)[there], MOST) <= limit("heights"):
+        return []
+    in_feet = np.median(np.abs((FOOT * measured - other) / sigma)[there]) < limit("by chance")
+    remedy = "height_in_feet" if in_feet else key.replace("height.", "level.")
+    apart, both = float(np.median(off[there])), float(np.median(sigma[there]))
+    return [contradiction(key, remedy, apart=apart, sigma=both)]
