@@ -66,9 +66,8 @@ def quick_motion(record: ImuRecord, wheel: Aiding) -> Array:
     speed = np.interp(time, wheel.time[known], wheel.measured[known, 1]) if known.any() else np.zeros(len(time))
     change = GRAVITY_EQUATOR * np.cross(theta, up) - np.cross(rate, speed[:, None] * wheel.C_mb[1])
     velocity = pushed + np.cumsum(change, axis=0) * T - 0.5 * T * change
-    moves = np.hstack([velocity, rate, force])
-    kernel = quick_kernel(BOX / T)
-    return np.stack([np.interp(wheel.time, time, _quick(column, kernel)) for column in moves.T], axis=1)
+    quick = _quick(np.hstack([velocity, rate, force]).T, quick_kernel(BOX / T))
+    return np.stack([np.interp(wheel.time, time, x) for x in quick], axis=1)
 
 
 def quick_kernel(rows: float) -> Array:
@@ -76,18 +75,25 @@ def quick_kernel(rows: float) -> Array:
     box = np.ones(2 * int(0.5 * rows) + 1)
     box /= len(box)
     k = np.convolve(np.convolve(box, box), box)
-    twice = np.convolve(k, k)
-    kernel = twice.copy()
+    kernel = np.convolve(k, k)
     kernel[len(k) // 2 : len(k) // 2 + len(k)] -= 2.0 * k
-    kernel[len(twice) // 2] += 1.0
+    kernel[len(kernel) // 2] += 1.0
     return kernel
 
 
-def _quick(x: Array, kernel: Array) -> Array:
-    """What is quick of a course; beyond its ends it goes on as if turned by half a turn about them."""
+def _quick(courses: Array, kernel: Array) -> Array:
+    """What is quick of courses, along the last axis; beyond its ends one goes on as if turned by half a turn about them."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
     beyond = len(kernel) // 2
-    longer = np.pad(x, beyond, mode="reflect", reflect_type="odd")
-    return np.convolve(longer, kernel, mode="valid")
+    length = courses.shape[-1] + 2 * beyond
+    fast = next_fast_len(length, real=True)
+    of_kernel = rfft(kernel, fast)
+    found = np.empty_like(courses)
+    for course, quick in zip(courses, found, strict=True):
+        longer = np.pad(course, beyond, mode="reflect", reflect_type="odd")
+        quick[:] = irfft(rfft(longer, fast) * of_kernel, fast)[2 * beyond : length]
+    return found
 
 
 def _on_grid(record: ImuRecord, steps: Array, time: Array) -> Array:
