@@ -53,7 +53,7 @@ def _on_its_path(source: Aiding, record: ImuRecord) -> Aiding:
 
 
 def quick_motion(record: ImuRecord, wheel: Aiding) -> Array:
-    """(M, 9) what is quick of velocity, rate and specific force, body axes, at the times of a wheel's speeds."""
+    """(M, 9) what is quick of velocity, rate and specific force, body axes, m/s, rad/s and m/s^2, at the times of a wheel."""
     dtheta, dvel = increments(record)
     time = np.arange(record.time[0] - record.steps[0], record.time[-1], max(GRID, record.interval))
     if len(time) < 2 or not len(wheel.time):
