@@ -42,7 +42,7 @@ from truenorth.state.now import NOW_C, NOW_TURN, matrix_of, vector_of
 Array = NDArray[np.float64]
 _PHI, _DP, _BG = 0, 6, 9
 NOISE, HARD, SOFT, ANOMALY, DISTANCE = 0.005, 0.1, 0.03, 0.02, 50.0  # of the field's strength; m
-SEAT = math.radians(1.0)  # one sigma about each axis
+SEAT = math.radians(0.5)  # one sigma about each axis: two chips on one board
 
 
 @compiled
@@ -201,7 +201,7 @@ class Magnetometer:
     anomaly_distance : float, m
         Way along which that changes.
     mounting : Mounting
-        ``C_mb``: IMU's to the sensor's axes; `angle_sigma`: how far off that may be, about each axis, a degree where nothing is
+        ``C_mb``: IMU's to the sensor's axes; `angle_sigma`: how far off that may be, about each axis, half a degree where nothing is
         said; its latency and gate.
     """
 

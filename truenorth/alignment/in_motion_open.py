@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.sprung import of_the_path
 from truenorth.alignment.in_motion_passes import fits_worse, turn_between
 from truenorth.alignment.in_motion_start import Guess, backtracked, start_at
 from truenorth.alignment.in_motion_task import INTERVAL, OUTPUT, MovingTask
@@ -88,7 +89,7 @@ def open_track(task: MovingTask, first: Guess, track: Track) -> Track | None:
     Track or None
         None where it does not come to rest, or not at what the log says: no motion near the one found fits the log best.
     """
-    used = task.aiding(gated=True)
+    used = of_the_path(task.aiding(gated=True), task.record)
     if any(source.loop > 0.0 for source in used):
         return None
     model = with_states(task.model, used)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.aids import ANTENNA, LATENCY_SIGMA, WHEEL
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
+from truenorth.aiding.sprung import of_the_path
 from truenorth.alignment.in_motion_learnt import differs
 from truenorth.alignment.in_motion_speed import driven, first_speed, speed_at
 from truenorth.alignment.in_motion_start import Guess, coarse_guess, start_at
@@ -196,7 +197,7 @@ class MovingTask:
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""
         record = self.record if until is None else self.record.between(self.record.time[0], until)
-        used = self.aiding(gated=gated)
+        used = of_the_path(self.aiding(gated=gated), record)
         start = start_at(self.record, guess, self.begin, self.spec, self.odometer, self.gnss, self.wheel, self.antenna)
         if self.held:
             up = start.C_nb[2]

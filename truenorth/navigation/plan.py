@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Aid
 from truenorth.aiding.source import Aiding
+from truenorth.aiding.sprung import of_the_path
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.given import fed_back
@@ -59,7 +60,7 @@ class Plan:
     def run(self, sensors: Sequence[Aiding], smooth: bool = False) -> Track:
         """Filter with these measurements; smooth once that is asked for (:meth:`Track.whole`): it takes ten times as long."""
         shown = with_unseen_arm(sensors, self.record, self.askew, known=self.swings, late=self.late, shaken=self.shaken)
-        used = [*shown, *self.always]
+        used = [*of_the_path(shown, self.record), *self.always]
         navigated = partial(
             navigate_track,
             self.record,
