@@ -201,8 +201,8 @@ class Magnetometer:
     anomaly_distance : float, m
         Way along which that changes.
     mounting : Mounting
-        ``C_mb``: IMU's to the sensor's axes; `angle_sigma`: how far off that may be, about each axis, half a degree where nothing is
-        said; its latency and gate.
+        ``C_mb``: IMU's to the sensor's axes; `angle_sigma`: how far off that may be, about each axis, half a degree where nothing
+        is said; its latency and gate.
     """
 
     record: MagnetometerRecord

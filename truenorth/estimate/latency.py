@@ -40,6 +40,7 @@ WIDER = 10.0  # times the prior of such a rate: quartz, ceramic resonators, osci
 WORST_CLOCK = 1e-2
 CLOCK_DIGITS = 6  # of a stamp, s
 WEAK = 0.3  # of a prior, below which it has a tenth of the say
+CONTRADICTED = 5.0  # sigmas of a prior, from which it is wrong itself
 SETTLED = 0.3  # of its sigma, by which a rate that is apart may still move
 SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word, or a pass
 SAID_DELAY = 0.02  # s, from which it is worth a word
@@ -131,7 +132,9 @@ def _more(track: Track, name: str) -> float:
     would be a guess about a guess, and passes go on from one to the next (-1.2, -2.9, -4.3 s of a robot's, with 0 +- .2).
     """
     late = delay_of(track, name)
-    if late is None or late[1] > WEAK * late[2] or abs(late[0]) <= max(LEAST_DELAY, SHOWN_DELAY * late[1]):
+    if late is None or abs(late[0]) <= max(LEAST_DELAY, SHOWN_DELAY * late[1]):
+        return 0.0
+    if late[1] > WEAK * late[2] and abs(late[0]) < CONTRADICTED * late[2]:
         return 0.0
     return late[0]
 
