@@ -152,7 +152,12 @@ def _reached(state: LoopState) -> float:
 
 
 def lag_of_fixes(setting: Setting) -> int:
-    """The state that is the delay of places over the ground; -1: there is none."""
+    """The state that is the delay of places over the ground; -1: there is none, or the receiver shows velocities of its own.
+
+    Those know the column of the delay by more than the places that it stands in.
+    """
+    if any(source.row.over_ground and source.row.unit == "m/s" for source in setting.sources):
+        return -1
     for source in setting.sources:
         if source.row.over_ground and source.row.unit == "m" and "lag" in source.states:
             return setting.model.layout.first_of(source.states["lag"].name)
