@@ -138,6 +138,12 @@ def started(motion, rng):
     return Start(0.0, C, s.v_n + dx[3:6], *place, np.zeros(3), np.zeros(3), np.diag(SIGMA**2))
 
 
+def test_a_delay_of_a_magnetometer_that_cannot_be_found_is_asked_for():
+    record = MagnetometerRecord(np.arange(3.0), np.tile(FIELD, (3, 1)))
+    with pytest.raises(tn.UsageError, match="say how late"):
+        Magnetometer(record, FIELD, mounting=Mounting(latency_sigma=0.1))
+
+
 @few_and_all(6, few=1)
 def test_a_magnetometer_alone_shows_no_accelerometers_that_warm_up(drive, runs):
     """What the ground adds changes along a way that nobody measures: a bias moved gains, by which one of 3 g fitted best."""

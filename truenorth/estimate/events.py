@@ -152,13 +152,17 @@ def _reached(state: LoopState) -> float:
 
 
 def lag_of_fixes(setting: Setting) -> int:
-    """The state that is the delay of places over the ground; -1: there is none, or the receiver shows velocities of its own.
+    """The state that is the delay of places over the ground; -1: there is none, or a sensor shows velocity.
 
-    Those know the column of the delay by more than the places that it stands in.
+    That knows the column of the delay by more than the places that it stands in. That nothing moves shows none.
     """
-    if any(source.row.over_ground and source.row.unit == "m/s" for source in setting.sources):
+    if any(_shows_velocity(source) for source in setting.sources):
         return -1
     for source in setting.sources:
-        if source.row.over_ground and source.row.unit == "m" and "lag" in source.states:
+        if source.over_ground and source.row.unit == "m" and "lag" in source.states:
             return setting.model.layout.first_of(source.states["lag"].name)
     return -1
+
+
+def _shows_velocity(source: Aiding) -> bool:
+    return source.row.unit == "m/s" and source.does == "measurement" and bool(np.nan_to_num(source.measured).any())

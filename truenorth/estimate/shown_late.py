@@ -48,9 +48,15 @@ def keep_moment(lag: int, x: Any, P: Any) -> None:
 
 
 @borrowing(forceinline=True)
+def is_late(lag: int, H: Any) -> bool:
+    """Whether a row is one of places that are shown late."""
+    return lag >= 0 and H[2, _DP + 2] != 0.0 and (H[0, lag] != 0.0 or H[1, lag] != 0.0 or H[2, lag] != 0.0)
+
+
+@borrowing(forceinline=True)
 def as_it_moves(lag: int, x: Any, H: Any) -> None:
     """Take the errors `x` that are known off the velocity in the column of a place that is shown late."""
-    if lag >= 0 and H[2, _DP + 2] != 0.0 and H[2, lag] != 0.0:
+    if is_late(lag, H):
         for i in range(3):
             for j in range(3):
                 H[i, lag] -= H[i, _DP + j] * x[_DV + j]
@@ -59,7 +65,7 @@ def as_it_moves(lag: int, x: Any, H: Any) -> None:
 @borrowing(forceinline=True)
 def as_late_as_known(lag: int, x: Any, now: Any, H: Any) -> None:
     """Make the columns of such a place those of a delay less its error `x`: ``-tau`` of velocity, ``v - tau a`` of the delay."""
-    if lag >= 0 and H[2, _DP + 2] != 0.0 and H[2, lag] != 0.0:
+    if is_late(lag, H):
         for i in range(3):
             for j in range(3):
                 H[i, _DV + j] -= H[i, _DP + j] * x[lag]

@@ -69,7 +69,8 @@ def warming_rivals(run: Callable[[ImuRecord], Track], first: Track, record: ImuR
     except DataError:
         return []
     # Responses hold for gains that stay as they are. Where a change moves the gains, it has to be shown by the whole of it.
-    as_rare = _as_rare(min(ratio, likelihood_ratio(first.residuals, without.residuals, one_model=True)))
+    shown = likelihood_ratio(first.residuals, without.residuals, one_model=True, whitened=True)
+    as_rare = _as_rare(min(ratio, shown))
     if as_rare <= limit("rival"):
         return []
     effect = moved(first, without)

@@ -55,7 +55,7 @@ class Mounting:
     C_mb : (3, 3) array
         IMU body to vehicle axes (right, forward, up) for body velocities.
     angle_sigma : float, rad
-        Of pitch and yaw of that; 0: known.
+        Of pitch and yaw of that, of a magnetometer or another system about each axis; 0: known.
     scale_sigma : float
         Of an odometer's or a log's scale factor; 0: known.
     bias_sigma : float or None, m/s or m
