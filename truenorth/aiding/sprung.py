@@ -39,16 +39,20 @@ from truenorth.strapdown.increments import increments
 Array = NDArray[np.float64]
 
 BOX = 1.2  # s, of each of the three means that make up what is slow
+LEAST = 0.1  # of what a constraint allows: of columns in step with less of it a hundredth counts
 GRID = 0.02  # s, on which it is looked at: bodies on springs are slower
 
 
 def of_the_path(aiding: Iterable[Aiding], record: ImuRecord) -> list[Aiding]:
-    """The same sources, but for wheels: their constraints hold for the path of the body without its quick motion."""
+    """The same sources, but for wheels of bodies that move quickly: their constraints hold for the path without that."""
     return [_on_its_path(source, record) if source.row is WHEEL else source for source in aiding]
 
 
 def _on_its_path(source: Aiding, record: ImuRecord) -> Aiding:
     quick = quick_motion(record, source)
+    across = (quick[:, :3] @ source.C_mb.T)[:, (0, 2)]
+    if np.sqrt(np.mean(across**2)) < LEAST * np.median(source.sigma[:, (0, 2)]):
+        return source
     return replace(source, kind=SPRUNG_WHEEL, measured=np.hstack([source.measured, quick]))
 
 

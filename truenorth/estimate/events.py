@@ -14,6 +14,7 @@ from truenorth.core.errors import UsageError
 from truenorth.errors.model import InsModel
 from truenorth.estimate.loop import SAME_TIME
 from truenorth.estimate.memory import AS_IT_IS, Memory, Samples
+from truenorth.quality.innovations import REST
 from truenorth.strapdown.increments import ImuRows
 
 Array = NDArray[np.float64]
@@ -159,10 +160,15 @@ def lag_of_fixes(setting: Setting) -> int:
     if any(_shows_velocity(source) for source in setting.sources):
         return -1
     for source in setting.sources:
-        if source.over_ground and source.row.unit == "m" and "lag" in source.states:
+        if (
+            source.row.over_ground
+            and source.row.unit == "m"
+            and source.does == "measurement"
+            and "lag" in source.states
+        ):
             return setting.model.layout.first_of(source.states["lag"].name)
     return -1
 
 
 def _shows_velocity(source: Aiding) -> bool:
-    return source.row.unit == "m/s" and source.does == "measurement" and bool(np.nan_to_num(source.measured).any())
+    return source.row.unit == "m/s" and source.does == "measurement" and source.name not in REST
