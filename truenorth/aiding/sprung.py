@@ -39,6 +39,10 @@ from truenorth.strapdown.increments import increments
 Array = NDArray[np.float64]
 
 BOX = 1.2  # s, of each of the three means that make up what is slow
+BLOCK, REACH = (
+    3600.0,
+    6.0 * BOX,
+)  # s, that is looked at together, and of what is before and behind: k twice reaches 3 boxes
 LEAST = 0.1  # of what a constraint allows: of columns in step with less of it a hundredth counts
 GRID = 0.02  # s, on which it is looked at: bodies on springs are slower
 
@@ -58,10 +62,19 @@ def _on_its_path(source: Aiding, record: ImuRecord) -> Aiding:
 
 def quick_motion(record: ImuRecord, wheel: Aiding) -> Array:
     """(M, 9) what is quick of velocity, rate and specific force, body axes, m/s, rad/s and m/s^2, at the times of a wheel."""
+    begins = np.arange(record.time[0], record.time[-1] + record.interval, BLOCK)
+    firsts = [0, *np.searchsorted(wheel.time, begins[1:]), len(wheel.time)]
+    parts = (record.between(begin - REACH, begin + BLOCK + REACH) for begin in begins)
+    found = [_of_part(part, wheel, wheel.time[i:j]) for part, i, j in zip(parts, firsts[:-1], firsts[1:], strict=True)]
+    return np.concatenate([np.zeros((0, 9)), *found])
+
+
+def _of_part(record: ImuRecord, wheel: Aiding, at: Array) -> Array:
+    """The same at some times of a wheel, of a part of the record about them."""
     dtheta, dvel = increments(record)
     time = np.arange(record.time[0] - record.steps[0], record.time[-1], max(GRID, record.interval))
-    if len(time) < 2 or not len(wheel.time):
-        return np.zeros((len(wheel.time), 9))
+    if len(time) < 2 or not len(at):
+        return np.zeros((len(at), 9))
     theta, pushed = (_on_grid(record, x, time) for x in (dtheta, dvel))
     T = time[1] - time[0]
     rate, force = (np.gradient(x, T, axis=0) for x in (theta, pushed))
@@ -71,7 +84,7 @@ def quick_motion(record: ImuRecord, wheel: Aiding) -> Array:
     change = GRAVITY_EQUATOR * np.cross(theta, up) - np.cross(rate, speed[:, None] * wheel.C_mb[1])
     velocity = pushed + np.cumsum(change, axis=0) * T - 0.5 * T * change
     quick = _quick(np.hstack([velocity, rate, force]).T, quick_kernel(BOX / T))
-    return np.stack([np.interp(wheel.time, time, x) for x in quick], axis=1)
+    return np.stack([np.interp(at, time, x) for x in quick], axis=1)
 
 
 def quick_kernel(rows: float) -> Array:

@@ -27,6 +27,7 @@ class MagnetometerFeed(Feed):
     hard_iron, soft_iron : float
         One sigma of the vehicle's iron, relative to the field.
     mounting : Mounting, optional
+        Left out: its seat is known to half a degree.
     axes : str, optional
         Where x, y and z point, of rows that are read from bytes or a file, such as ``"FRD"``.
     """
