@@ -46,14 +46,19 @@ def test_bands_of_a_filter_by_a_sparse_log_are_its_own(course, silence):
     A row counts at the end of its step, from which the errors have no time to grow: while level is unsure that is a
     quarter, later less than a tenth.
     """
-    kind, absent = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05), sparse(course, silence)
+    bands, own = alike(course, Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05), sparse(course, silence))
+    assert np.all(bands[1:] > 0.75 * own[1:])
+
+
+def alike(course, kind, absent):
+    """Sigmas of a filter by its bands and by itself, which are one once it has settled."""
     rows = reference(course, 0.0)
     rows[absent] = np.nan
     own = run_filters(course, rows, start=0, kinds={"one": kind})["one"].sigma[:, :7]
     bands = filter_bands(course, kind, kind, absent=absent).errors
     np.testing.assert_allclose(bands[SETTLED::STEP], own[SETTLED::STEP], rtol=0.1)
     assert np.all(bands[SETTLED:] > 0.9 * own[SETTLED:])
-    assert np.all(bands[1:] > 0.75 * own[1:])
+    return bands, own
 
 
 def test_a_network_without_rows_is_an_undamped_ins(course, whole):
@@ -84,12 +89,7 @@ def test_bands_of_a_filter_with_fixes_are_its_own(course, stands):
     z[1203, 2], size[1203, 2] = 0.0, 1e-4
     absent = sparse(course) if stands else np.ones(len(course), dtype=bool)
     kind = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05, fixes=FixRows(z, size))
-    rows = reference(course, 0.0)
-    rows[absent] = np.nan
-    own = run_filters(course, rows, start=0, kinds={"one": kind})["one"].sigma[:, :7]
-    bands = filter_bands(course, kind, kind, absent=absent).errors
-    np.testing.assert_allclose(bands[SETTLED::STEP], own[SETTLED::STEP], rtol=0.1)
-    assert np.all(bands[SETTLED:] > 0.9 * own[SETTLED:])
+    _, own = alike(course, kind, absent)
     assert np.all(own[700, DP] < 0.7 * own[699, DP])
     assert np.all(own[910, DP] < 0.7 * own[900, DP])
     assert own[1210, PHI][2] < 0.9 * own[1200, PHI][2]

@@ -1,5 +1,6 @@
 """A wheel on a vehicle whose body heaves and pitches on its springs: what its constraints say of sensors, and what not."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -86,6 +87,8 @@ def test_a_body_that_does_not_move_on_its_springs_has_the_constraints_of_its_whe
     (of_path,) = of_the_path([source], shaken)
     assert of_path.measured.shape[1] == source.measured.shape[1] + 9
     assert of_the_path([of_path], shaken)[0] is of_path
+    none = replace(source, time=source.time[:0], measured=source.measured[:0], sigma=source.sigma[:0])
+    assert of_the_path([none], shaken)[0] is none
 
 
 def test_a_long_log_is_looked_at_in_parts(monkeypatch):

@@ -42,9 +42,7 @@ from truenorth.state.now import NOW_C, NOW_TURN, matrix_of, vector_of
 Array = NDArray[np.float64]
 _PHI, _DP, _BG = 0, 6, 9
 NOISE, HARD, SOFT, ANOMALY, DISTANCE = 0.005, 0.1, 0.03, 0.02, 50.0  # of the field's strength; m
-LATEST = (
-    0.05  # s, one sigma of a delay: a body that pitches turns by less in a longer one than by the rate of the moment
-)
+LATEST = 0.05  # s, one sigma of a delay: in a longer one a body that pitches turns by less than by its rate
 SEAT = math.radians(0.5)  # one sigma about each axis: two chips on one board
 
 
@@ -225,7 +223,6 @@ class Magnetometer:
                 f"magnetometer: noise {self.noise:g}, iron and anomaly {sigmas}, distance {self.anomaly_distance:g} m; "
                 "expected a noise and a distance above zero, parts of the earth's field from 0 to 1"
             )
-
         if self.mounting.latency_sigma > LATEST:
             raise UsageError(
                 f"magnetometer: a latency known to {self.mounting.latency_sigma:g} s; expected {LATEST:g} s or better: "

@@ -39,10 +39,7 @@ from truenorth.strapdown.increments import increments
 Array = NDArray[np.float64]
 
 BOX = 1.2  # s, of each of the three means that make up what is slow
-BLOCK, REACH = (
-    3600.0,
-    6.0 * BOX,
-)  # s, that is looked at together, and of what is before and behind: k twice reaches 3 boxes
+BLOCK, REACH = 3600.0, 6.0 * BOX  # s, looked at together, and before and behind: k twice reaches 3 boxes
 LEAST = 0.1  # of what a constraint allows: of columns in step with less of it a hundredth counts
 GRID = 0.02  # s, on which it is looked at: bodies on springs are slower
 
@@ -53,6 +50,8 @@ def of_the_path(aiding: Iterable[Aiding], record: ImuRecord) -> list[Aiding]:
 
 
 def _on_its_path(source: Aiding, record: ImuRecord) -> Aiding:
+    if not len(source.time):
+        return source
     quick = quick_motion(record, source)
     across = (quick[:, :3] @ source.C_mb.T)[:, (0, 2)]
     if np.sqrt(np.mean(across**2)) < LEAST * np.median(source.sigma[:, (0, 2)]):

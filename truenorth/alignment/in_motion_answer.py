@@ -55,7 +55,7 @@ def moving_answer(
     groups = (GYRO_AXES, ACCEL_AXES) if task.antenna.lever_arm.any() else (GYRO_AXES, ACCEL_AXES, ANTENNA_ARM)
     moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting, groups)
     delays = delays_found(track, {"GNSS": task.antenna, "odometer": task.wheel, "velocity log": task.wheel})
-    known = np.diag(moving.P)[BG]
+    before = np.diag(moving.P)[BG]
     # Navigation goes on from there: what heading is less sure of belongs to it, too.
     less_sure = covariance[2, 2] - history.phi_covariance[-1][2, 2]
     if task.gnss is None and not task.more:
@@ -64,7 +64,7 @@ def moving_answer(
     elif spread.heading > 0.0:
         moving = moving.off_together(apart)
     # A heading that is less sure goes with what the gyros' biases make of the earth's rate.
-    gyro_more = np.diag(moving.P)[BG] - known
+    gyro_more = np.diag(moving.P)[BG] - before
     clocks = rates_found(track, task.antenna)
     moving = replace(moving, delays=delays, clocks=clocks, acting_bias=track.accel_bias[-1])
     return Alignment(

@@ -19,6 +19,7 @@ from truenorth.core.errors import UsageError
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 DEG_PER_HOUR = math.radians(1.0) / 3600.0  # rad/s
+FOOT = 0.3048  # m
 MICRO_G = 1e-6 * STANDARD_GRAVITY  # m/s^2
 
 Dimension = tuple[Fraction, ...]  # exponents of angle, length, time, temperature, magnetic flux density
@@ -42,7 +43,7 @@ _ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
     "mm": (1e-3, (0, 1, 0, 0)),
     "km": (1e3, (0, 1, 0, 0)),
     "nmi": (1852.0, (0, 1, 0, 0)),
-    "ft": (0.3048, (0, 1, 0, 0)),
+    "ft": (FOOT, (0, 1, 0, 0)),
     "mi": (1609.344, (0, 1, 0, 0)),
     "kn": (1852.0 / 3600, (0, 1, -1, 0)),
     "s": (1.0, (0, 0, 1, 0)),

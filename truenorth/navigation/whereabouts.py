@@ -13,6 +13,7 @@ from truenorth.aiding.source import Aiding
 from truenorth.core.earth import ecef_from_geodetic
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
+from truenorth.core.units import FOOT
 from truenorth.navigation.given import record_of
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord
 from truenorth.records.overlap import no_overlap
@@ -25,7 +26,6 @@ FIXES = 5  # of the log's beginning that are looked at, by their median: one out
 SIGMAS = 6.0
 FASTEST, STEEPEST = 400.0, 30.0  # m/s, of a vehicle between the alignment's epoch and the fix
 LEAST_FAR, LEAST_HIGH = 200.0, 50.0  # m
-FOOT = 0.3048  # m
 CLOSER = 0.01  # of the distance is left where a mistake is undone
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Barometer, Gnss
 from truenorth.aiding.sensors import BARO_SIGMA, height_sigma, place_axes
+from truenorth.core.units import FOOT
 from truenorth.quality.slow_aids import usual_bias
 from truenorth.state.evidence import Evidence, contradiction
 from truenorth.state.limits import limit
@@ -24,7 +25,6 @@ from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
-FOOT = 0.3048  # m
 FEWEST = 5  # rows
 FIRST = 5.0  # s of a barometer's rows that are held against the start
 NEIGHBOURS = 5.0  # s, between fixes: heights in between are on the line from one to the next

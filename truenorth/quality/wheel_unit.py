@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.core.units import FOOT
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.state.mounting import Mounting
 from truenorth.strapdown.increments import increments
@@ -52,7 +53,7 @@ FACTORS = {
     "km/h": 3.6,
     "mph": 3600.0 / 1609.344,
     "knots": 3600.0 / 1852.0,
-    "ft/s": 1.0 / 0.3048,
+    "ft/s": 1.0 / FOOT,
     "cm/s": 100.0,
     "mm/s": 1000.0,
 }
