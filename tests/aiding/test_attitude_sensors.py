@@ -18,7 +18,7 @@ from truenorth.records.specs import imu_spec
 from truenorth.simulation import ideal_log, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight, turn
-from truenorth.state.layout import PHI
+from truenorth.state.layout import BG, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
@@ -142,6 +142,35 @@ def test_a_delay_of_a_magnetometer_that_cannot_be_found_is_asked_for():
     record = MagnetometerRecord(np.arange(3.0), np.tile(FIELD, (3, 1)))
     with pytest.raises(tn.UsageError, match="say how late"):
         Magnetometer(record, FIELD, mounting=Mounting(latency_sigma=0.1))
+
+
+def sigma_of_gyro(velocity, unsure):
+    """About the vertical, after a minute straight on, rad/s, of an IMU without errors but for gyro biases that are not known."""
+    good = replace(
+        imu_spec("navigation"),
+        gyro_random_walk=1e-9,
+        accel_random_walk=1e-9,
+        gyro_bias=np.radians(0.05),
+        accel_bias=1e-9,
+        gyro_bias_instability=0.0,
+        accel_bias_instability=0.0,
+    )
+    motion = course(PLACE, [*straight(90.0)], heading=0.0, speed=velocity)
+    record = simulate(motion, rate=10.0, duration=60.0, imu=None, seed=1).record
+    t, s = np.arange(1.0, 60.0), motion.states(0.0)
+    seen = np.einsum("kji,j->ki", motion.states(t).C_nb, FIELD)
+    needle = Magnetometer(MagnetometerRecord(t, seen), FIELD, soft_iron=0.0, mounting=Mounting())
+    P = np.diag(np.repeat([np.radians(1e-3), unsure / np.sqrt(3.0), 1.0, 1e-9, 1e-9], 3) ** 2)
+    P[BG.stop - 1, BG.stop - 1] = np.radians(0.05) ** 2
+    start = Start(0.0, s.C_nb, s.v_n, float(s.lat), float(s.lon), float(s.alt), np.zeros(3), np.zeros(3), P)
+    return tn.navigate(record, start, imu=good, aid=[needle], altitude="free").track.sigma[-1, BG.stop - 1]
+
+
+def test_an_anomaly_changes_along_the_way_that_is_to_be_expected():
+    """A velocity of 0 +- 8 m/s was a standstill to it: a field that stays showed there how the gyro is biased."""
+    standing, unsure, driving = sigma_of_gyro(0.0, 0.01), sigma_of_gyro(0.0, 8.0), sigma_of_gyro(8.0, 0.01)
+    assert driving > 1.5 * standing
+    np.testing.assert_allclose(unsure, driving, rtol=0.05)
 
 
 @few_and_all(6, few=1)

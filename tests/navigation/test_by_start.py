@@ -13,7 +13,7 @@ from truenorth.navigation import navigate
 from truenorth.navigation.by_start import UP, Others, _shifts, start_evidence, stretch
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import Sway, Tone, simulate
-from truenorth.state.layout import BG
+from truenorth.state.layout import BG, SLOW_GYRO
 from truenorth.state.track import Track
 
 DOCK = Position.from_degrees(40.0, 118.0)
@@ -25,7 +25,9 @@ def navigated(motion, grade, duration, seed):
     rng, spec = np.random.default_rng(seed), imu_spec(grade)
     log = simulate(motion, rate=25.0, duration=duration, imu=spec, seed=seed)
     answer = navigate(log.record, drawn_start(motion, spec, rng), aid=received(motion, duration, 1.0, rng), imu=spec)
-    return answer, answer.track.errors_against(Track.along(motion.states(answer.time))) / answer.track.sigma[:, :9]
+    track = answer.track
+    of_gyros = (track.gyro_bias[-1] - log.errors.gyro_bias) / track.bias_sigma(BG, SLOW_GYRO)[-1]
+    return answer, track.errors_against(Track.along(motion.states(answer.time))) / track.sigma[:, :9], of_gyros
 
 
 @pytest.mark.parametrize(
@@ -41,15 +43,16 @@ def navigated(motion, grade, duration, seed):
     ),
 )
 def test_heading_without_a_push_is_as_unsure_as_its_gyro(motion, grade, duration, seed):
-    """Eight sigmas off, `navigated`, or refused for scale factors 30 times as large."""
-    answer, off = navigated(motion, grade, duration, seed)
+    """Eight sigmas off, `navigated`, or refused for scale factors 30 times as large; the gyro's bias six to twelve."""
+    answer, off, of_gyros = navigated(motion, grade, duration, seed)
     assert np.abs(off[:, UP]).max() < 4.0
+    assert np.abs(of_gyros).max() < 4.0
     assert answer.status == "navigated"
 
 
 @pytest.mark.parametrize("seed", some([1], [2, 3, 4]))
 def test_a_swell_shows_heading_and_sigma_stays(seed):
-    answer, off = navigated(SWELL, "consumer", 200.0, seed)
+    answer, off, _ = navigated(SWELL, "consumer", 200.0, seed)
     assert np.degrees(answer.track.sigma[-1, UP]) < 3.0
     assert np.abs(off[:, UP]).max() < 4.0
     assert not any(item.key == "heading.by_start" for item in answer.evidence)
@@ -82,7 +85,7 @@ def test_a_heading_that_its_gyro_alone_has_turned_is_one_error():
 
 def test_a_linear_answer_is_left_as_it_is():
     """It moves by what its covariance says of the start, and no less than none of sigma is seen."""
-    answer, _ = navigated(SWELL, "industrial", 60.0, 1)
+    answer, _, _ = navigated(SWELL, "industrial", 60.0, 1)
     start = drawn_start(SWELL, imu_spec("consumer"), np.random.default_rng(1))
     evidence, growth = start_evidence(lambda _: answer.track, start, answer.track)
     assert evidence == []
@@ -114,7 +117,7 @@ def test_a_linear_filter_moves_by_no_more_than_its_sigma():
 
 def test_up_to_now_is_what_a_log_that_ends_now_says():
     """A running answer takes epochs one by one: its growth at each is that of the last epoch of the track until there."""
-    answer, _ = navigated(SWELL, "industrial", 60.0, 1)
+    answer, _, _ = navigated(SWELL, "industrial", 60.0, 1)
     start = drawn_start(SWELL, imu_spec("consumer"), np.random.default_rng(1))
     others, track = Others.of(start), answer.track
     sizes = np.array([1.0, 1.2, 1.6, 0.9, 0.4, 0.8, 1.4, 0.6, 0.3])[:, None]

@@ -39,7 +39,7 @@ from truenorth.state.now import (
 )
 from truenorth.strapdown.wander import acceleration, advance, azimuth, earth_axis, set_matrix
 
-_PHI, _BG, _BA = 0, 9, 12
+_PHI, _DV, _BG, _BA = 0, 3, 9, 12
 WHOLE = 12  # rows and columns that are summed whole: the dynamic states, and what fills up the last four
 
 
@@ -226,7 +226,11 @@ def predict_to_event(
     if len(d.acts) > 0:
         act(m, model, F, now)
     n = len(d.decay)
-    speed = (means.vectors[1, 0] ** 2 + means.vectors[1, 1] ** 2 + means.vectors[1, 2] ** 2) ** 0.5
+    # What changes along the way goes with the speed that is to be expected, `E v^2`: an estimate of nothing is no standstill.
+    speed = 0.0
+    for j in range(3):
+        speed += means.vectors[1, j] ** 2 + w.P[_DV + j, _DV + j]
+    speed = speed**0.5
     for i in range(n):
         rate[i] = d.decay[i] + speed * d.along[i]
     transition(size, F, rate, T, w.Phi, w.Phi_t)

@@ -16,7 +16,8 @@ not show it:
     sigma^2 = P_psi + 2 t P_psi,b + t^2 P_b
 
 and so is what goes with it, such as the place of the IMU by an antenna on an arm: `P` with another variance of heading, the others
-given heading as they were. The rule is ours.
+given heading as they were. The bias of the gyro about the vertical is as unsure as at the start, about what it was there: the filter
+moved it by what passed for knowledge. The rule is ours.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ class Others:
     parts: tuple[float, ...]  # of a sigma
     time: float  # s; of the start
     variance: Array  # (2, 2) of heading and of the gyro about the vertical
+    gyro_bias: Array  # (3,) rad/s; of the start
 
     @classmethod
     def of(cls, start: Start) -> Others:
@@ -59,7 +61,7 @@ class Others:
         shifts, variance = _shifts(start)
         parts = [min(1.0, NEAR / max(float(np.linalg.norm(shift[PHI])), 1e-300)) for shift in shifts.T]
         starts = tuple(start.with_errors(part * shift) for part, shift in zip(parts, shifts.T, strict=True))
-        return cls(starts, tuple(parts), start.time, variance)
+        return cls(starts, tuple(parts), start.time, variance, np.asarray(start.gyro_bias))
 
     def free(self, time: Array) -> Array:
         """(K,) one sigma of heading, rad, as the start and its gyro alone leave it."""
@@ -74,19 +76,27 @@ class Others:
         return np.sqrt(squares)
 
     def growth(self, track: Track, moved: Array, most: float = 0.0) -> Array:
-        """(K, 9) by how many times sigmas grow; `most`: see :func:`stretch`."""
+        """(K, 12) by how many times sigmas of phi, dv, dp and gyro biases grow; `most`: see :func:`stretch`."""
         sigma, free = track.sigma[:, :9], self.free(track.time)
+        growth = np.ones((len(track), BG.stop))
         if free[-1] < LINEAR:
-            return np.ones_like(sigma)
+            return growth
         safe = np.where(sigma > 0.0, sigma, np.inf)
-        growth = np.maximum(moved / safe, 1.0)
-        more = np.where(_unseen(track, moved, most), np.maximum(free**2 - sigma[:, UP] ** 2, 0.0), 0.0)
+        unseen = _unseen(track, moved, most)
+        more = np.where(unseen, np.maximum(free**2 - sigma[:, UP] ** 2, 0.0), 0.0)
         along = track.P[:, :9, UP] * np.sqrt(more)[:, None] / safe[:, UP, None] ** 2
-        return np.maximum(growth, np.sqrt(1.0 + along**2 / safe**2))
+        growth[:, :9] = np.maximum(np.maximum(moved / safe, 1.0), np.sqrt(1.0 + along**2 / safe**2))
+        up, of_gyros = track.C_nb[:, 2], track.P[:, BG, BG]
+        known = np.einsum("ki,kij,kj->k", up, of_gyros, up)
+        led = np.einsum("ki,ki->k", up, track.gyro_bias - self.gyro_bias)  # by what passed for knowledge
+        more = np.where(unseen, np.maximum(self.variance[1, 1] + led**2 - known, 0.0), 0.0)
+        own = np.diagonal(of_gyros, axis1=1, axis2=2)
+        growth[:, BG] = np.sqrt(1.0 + more[:, None] * up**2 / np.where(own > 0.0, own, np.inf))
+        return growth
 
 
 def start_evidence(run: Callable[[Start], Track], start: Start, track: Track) -> tuple[list[Evidence], Array]:
-    """What the log does not show of heading though the filter says so, and by how much sigmas of phi, dv and dp grow for it.
+    """What the log does not show of heading though the filter says so, and by how much sigmas grow for it.
 
     Parameters
     ----------
@@ -99,10 +109,10 @@ def start_evidence(run: Callable[[Start], Track], start: Start, track: Track) ->
     Returns
     -------
     evidence : list of Evidence
-    growth : (K, 9) array
-        Times one sigma, along the way; ones where the answer depends on the start as sigma says.
+    growth : (K, 12) array
+        Times one sigma of phi, dv, dp and gyro biases, along the way; ones where the answer depends on the start as sigma says.
     """
-    others, none = Others.of(start), np.ones((len(track), 9))
+    others, none = Others.of(start), np.ones((len(track), BG.stop))
     if others.free(track.time[-1:])[0] < LINEAR:
         return [], none
     try:

@@ -51,7 +51,7 @@ from truenorth.navigation.gyro_moment import gyros_of_another_moment
 from truenorth.navigation.passes import filtered, quick_swing
 from truenorth.navigation.plan import Plan
 from truenorth.navigation.restarted import about_its_start
-from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
+from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma, with_others
 from truenorth.navigation.second_look import SENSORS, second_look
 from truenorth.navigation.start import acting_at_rest, force_at_rest, of_poorer, start_of
 from truenorth.navigation.start_check import check_start, check_start_at_rest
@@ -354,7 +354,7 @@ def _rivals(
     loose = looser_track(plan, given) if loose is None else loose
     found += second_look(loose, track, looked_at(given), quick_swing(plan, given))
     unsure, growth = start_evidence(of_start, plan.start, track)
-    return found + unsure, np.maximum(growth_along(track, others), growth)
+    return found + unsure, np.maximum(with_others(growth_along(track, others), growth.shape[-1]), growth)
 
 
 def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:

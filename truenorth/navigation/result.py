@@ -305,13 +305,14 @@ def last_sigma(track: Track) -> Effect:
 def judged_navigation(result: Navigation, evidence: Sequence[Evidence], least: Array | None = None) -> Navigation:
     """The verdict on a navigation by its last epoch; what the evidence adds to sigma is in its covariance, as a share of it.
 
-    On the way sigmas of phi, dv and dp grow by (K, 9) times at `least`, unless the model is contradicted.
+    On the way sigmas of the first m states grow by (K, m) times at `least`, unless the model is contradicted.
     """
     claim = last_sigma(result.track)
     verdict = judge(Claim(claim), evidence)
     status: Status = verdict.status("navigated")  # type: ignore[assignment]  # heading has no limit here
     if status != "inconsistent" and (verdict.added != NO_EFFECT or least is not None):
-        growth = np.ones(result.track.P.shape[:2]) if least is None else _with_others(least, result.track)
+        states = result.track.P.shape[-1]
+        growth = with_others(np.ones((len(result.track), 0)) if least is None else least, states)
         if verdict.added != NO_EFFECT:
             grows = {name: s / own for (name, s), (_, own) in zip(verdict.sigma.items(), claim.items(), strict=True)}
             of_states = np.ones(growth.shape[1])
@@ -323,7 +324,6 @@ def judged_navigation(result: Navigation, evidence: Sequence[Evidence], least: A
     return replace(result, status=status, evidence=verdict.evidence)
 
 
-def _with_others(growth: Array, track: Track) -> Array:
+def with_others(growth: Array, states: int) -> Array:
     """(K, n) the growth of the first states, none of the others."""
-    others = np.ones((len(track), track.P.shape[-1] - growth.shape[-1]))
-    return np.concatenate([growth, others], axis=1)
+    return np.concatenate([growth, np.ones((len(growth), states - growth.shape[-1]))], axis=1)
