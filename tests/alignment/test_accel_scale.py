@@ -9,6 +9,8 @@ from tests.runs import some
 from truenorth.alignment import rotary
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.campaign.faults import run_faults
+from truenorth.core.position import Position
+from truenorth.simulation.scenario import read_scenario
 
 SEED = 771235
 
@@ -56,6 +58,26 @@ def test_one_along_the_inner_axis_is_refused():
     """Once silent: heading 3.9 sigmas off, level 3.4."""
     (trial,) = run_faults(["rotary"], ["accel scale"], runs=1, seed=771204)
     assert trial.outcome == "flagged", trial
+
+
+@pytest.mark.parametrize("seed", some([0], [1, 2, 3, 4, 5]))
+def test_noise_alone_is_no_scale_factor(seed):
+    """At rest no gravity reaches the axis of the inner turns: its noise, in readings and innovations, was one of 100 %."""
+    of = {
+        "name": "still",
+        "duration": "480 s",
+        "rate": "20 Hz",
+        "position": {"lat": "40 deg", "lon": "10 deg"},
+        "motion": {"kind": "rest", "heading": "30 deg"},
+        "imu": "tactical",
+        "indexer": {"scheme": "8", "dwell": "40 s", "encoder": {"resolution": "1 arcsec"}},
+    }
+    still = read_scenario(of)
+    encoder = still.simulate_aiding(seed=seed, run=0)["encoder"].record
+    place = Position.from_degrees(40.0, 10.0)
+    answer = rotary.align_rotary(still.simulate(seed=seed, run=0).record, encoder, place, "tactical", axes=("z", "x"))
+    assert answer.status == "aligned"
+    assert found_in(answer) is None
 
 
 def test_a_sound_log_has_none(monkeypatch):

@@ -9,7 +9,9 @@ Along the other axes, which gravity turns through, the fit of the base's motion 
 see it.
 
 Whether there is one is asked of gravity alone: the noise of the accelerometers is in their readings and in the innovations, and a
-scale factor of one would explain the one by the other. Its size is asked of the force as measured, which has the sway.
+scale factor of one would explain the one by the other. Its size is asked of the force as measured, which has the sway. On a base at
+rest an axis of the inner turns has no force but its noise: what it measures is not what gravity would do to it, and nothing is
+known of its scale factor.
 
 An IMU whose specification names no scale factors has small ones all the same. So what was found counts by what it does.
 """
@@ -56,7 +58,10 @@ def accel_scale_evidence(fine: FineAlignment, spec: ImuSpec) -> list[Evidence]:
     best = int(np.argmax(ratio[: len(SCALES)]))
     if ratio[best] <= limit("drift"):
         return []
-    axis, best = "xyz"[best], best + len(SCALES)
+    gravity, axis, best = best, "xyz"[best], best + len(SCALES)
+    shared = float(np.sum(white[:, :, gravity] * white[:, :, best])) / np.sqrt(energy[gravity] * energy[best])
+    if shared < limit("gravity in force") or match[gravity] * match[best] <= 0.0:
+        return []
     size = match[best] / energy[best]
     moved = np.abs(size * left[PHI, best])
     effect = Effect(heading=float(moved[2]), level=float(np.hypot(moved[0], moved[1])))

@@ -58,6 +58,12 @@ LIMITS: dict[str, Limit] = {
         "sigma",
         "a sound IMU misses its specification by that much once in a hundred; from here on the miss is in sigma",
     ),
+    "gravity in force": Limit(
+        0.1,
+        "1",
+        "correlation of what gravity does to an accelerometer with what it measures: noise alone has .02 to .05 over minutes, "
+        "the least of scale factors that were put in .14",
+    ),
     "drift": Limit(
         25.0, "1", "likelihood ratio, chi-square with 1 degree of freedom, 60 signatures: 4e-5 false alarms at most"
     ),
