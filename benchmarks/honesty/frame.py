@@ -153,19 +153,22 @@ def _row(cells: Sequence[str]) -> str:
 
 
 def main(cases: Sequence[Case], about: str = "RMS of error over sigma, refusals, and the worst run") -> None:
-    """Command line: ``--runs``, ``--seed``, ``--only`` part of a name or procedure, ``--markdown``, ``--page``, ``--verbose``."""
+    """Command line: ``--runs``, ``--seed``, ``--only`` part of `procedure: name`, ``--markdown``, ``--page``, ``--verbose``."""
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="", help="cases with this in their procedure or name")
+    parser.add_argument(
+        "--only", default="", help="cases with this in `procedure: name`, such as 'damping double: IMU'"
+    )
     parser.add_argument("--markdown", action="store_true", help="the table as the documents have it")
     parser.add_argument("--page", type=Path, help="a page whose table gets each row as it is done: docs/honesty.md")
     parser.add_argument("--verbose", action="store_true")
     given = parser.parse_args()
     lines = []
-    for case in cases:
-        if given.only not in f"{case.procedure}: {case.name}":
-            continue
+    asked = [case for case in cases if given.only in f"{case.procedure}: {case.name}"]
+    if not asked:
+        parser.error(f"--only {given.only!r}: no case has this in its `procedure: name`")
+    for case in asked:
         line = run_case(case, given.seed, given.runs, given.verbose)
         lines.append(line)
         if given.page is not None:

@@ -1,6 +1,7 @@
 """IMUs with every term that a specification may have: noise, biases, axes, g-sensitivity, temperature, lags, steps, places.
 
-The specification is given, as it is drawn from. Procedures and motions are those of the campaign of faults.
+The specification is given, as it is drawn from. Procedures and motions are those of the campaign of faults. The plumb line is
+deflected as sigma of an alignment allows for.
 
 Run: ``python -m benchmarks.honesty.specified --runs 20``.
 """
@@ -12,11 +13,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.honesty.frame import Case, Outcome, main
+from truenorth.alignment.result import Alignment
+from truenorth.alignment.task import deflection_covariance
 from truenorth.campaign.fault_benches import BENCHES, misses
+from truenorth.core.earth import normal_gravity
 from truenorth.records.spec_keys import ENTRIES
 from truenorth.records.specs import field_of, imu_spec
+
+Array = NDArray[np.float64]
 
 EVERY = Path(__file__).parents[2] / "examples" / "imu_every_term.yaml"
 GOOD = ("aligned", "level_only", "not_converged", "navigated")
@@ -49,9 +56,22 @@ def every_term(procedure: str, grade: str) -> Any:
         inputs, truth = drawn.draw(seed, number)
         answer = drawn.align(inputs)
         refused = "" if answer.status in GOOD else f"{answer.status}: {answer.reasons[0]}"
-        return Outcome(misses(answer, truth), refused, answer.status)
+        off = misses(answer, truth)
+        if isinstance(answer, Alignment):
+            off = _by_the_plumb_line(off, answer, np.random.default_rng([seed, number, 1]))
+        return Outcome(off, refused, answer.status)
 
     return run
+
+
+def _by_the_plumb_line(off: dict[str, Array], answer: Alignment, rng: np.random.Generator) -> dict[str, Array]:
+    """The misses of an IMU that levels itself by a plumb line that is deflected; the simulator's is straight."""
+    here = answer.position
+    drawn = rng.multivariate_normal(
+        np.zeros(3), deflection_covariance(here.lat, float(normal_gravity(here.lat, here.alt)))
+    )
+    more = drawn / np.sqrt(np.diag(answer.phi_covariance))
+    return {name: x + more[{"level": slice(2), "heading": slice(2, 3)}[name]] for name, x in off.items()}
 
 
 CASES = tuple(
