@@ -222,6 +222,7 @@ CASES = (
         GOOD,
     ),
     Case("GNSS, car", vehicle("industrial", FIXES), by("industrial"), GOOD),
+    Case("GNSS, car, errors as assumed", vehicle("industrial", WANDERING), by("industrial", assumed_fixes), GOOD),
     Case("GNSS, positions wander by 2 m", vehicle("industrial", WANDERING), by("industrial"), GOOD),
     Case("GNSS late by 1 s, car", vehicle("industrial", FIXES | {"latency": "1 s"}), by("industrial"), GOOD),
     Case(
