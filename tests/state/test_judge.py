@@ -107,6 +107,15 @@ def test_what_chance_may_have_shown_refuses_nothing(claim, item):
         assert getattr(verdict.sigma, name) >= getattr(claim.sigma, name)
 
 
+def test_what_two_checks_have_found_is_said_once():
+    """A step of 1.3 mm/s stood in a result twice, with the ratio of each check."""
+    found = {"axis": "east", "velocity": 1e-3, "heading": 0.0, "level": 0.0, "chance": 12.0}
+    twice = [Evidence("drift.step", found | {"onset": 75.2, "ratio": r}, "hint", Effect()) for r in (102.0, 148.0)]
+    later = Evidence("drift.step", found | {"onset": 90.0, "ratio": 30.0}, "hint", Effect())
+    claim = Claim(Effect(heading=1e-3, level=1e-4))
+    assert judge(claim, [*twice, later]).evidence == (twice[1], later)
+
+
 def test_a_sigma_that_grows_beyond_its_limit_is_no_good():
     claim = Claim(Effect(3e-3, 1e-4, math.inf, math.inf), heading_limit=4e-3, waiting=False)
     assert judge(claim, []).finding == "good"

@@ -16,8 +16,8 @@ not show it:
     sigma^2 = P_psi + 2 t P_psi,b + t^2 P_b
 
 and so is what goes with it, such as the place of the IMU by an antenna on an arm: `P` with another variance of heading, the others
-given heading as they were. The bias of the gyro about the vertical is as unsure as at the start, about what it was there: the filter
-moved it by what passed for knowledge. The rule is ours.
+given heading as they were. The bias of the gyro about the vertical is as unsure as it was at the start, about its value there: the
+filter moved it by what passed for knowledge. The rule is ours.
 """
 
 from __future__ import annotations

@@ -82,6 +82,7 @@ def judge(claim: Claim, evidence: Iterable[Evidence]) -> Verdict:
             adding.append(item)
         else:
             deciding.append(item)
+    rest = _said_once(rest)
     # Many that are added each may be too much together.
     if not deciding and weight(added, given) > limit("growth"):
         deciding, adding = adding, []
@@ -99,6 +100,21 @@ def weight(effect: Effect, sigma: Effect) -> float:
         if e > 0.0 and math.isfinite(s):
             largest = max(largest, e / s if s > 0.0 else math.inf)
     return largest
+
+
+def _said_once(notes: list[Evidence]) -> list[Evidence]:
+    """Notes, of those that two checks have found on one axis at one time the likelier one."""
+    best: dict[tuple[object, ...], Evidence] = {}
+    for item in notes:
+        seen = item.figures
+        at = (
+            (item.key, seen["axis"], round(float(seen["onset"])))
+            if {"axis", "onset", "ratio"} <= set(seen)
+            else (id(item),)
+        )
+        if at not in best or float(seen["ratio"]) > float(best[at].figures["ratio"]):
+            best[at] = item
+    return list(best.values())
 
 
 def _on(effect: Effect, sigma: Effect) -> Effect:
