@@ -12,11 +12,13 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from truenorth.alignment import align
+from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.formats import write_imu
@@ -253,6 +255,19 @@ def test_nmea_has_its_checksum_and_heading(log):
         "T",
         f"{np.degrees(answers[-1].euler[2]):+.3f}",
     ]
+
+
+@pytest.mark.parametrize(
+    ("at", "stamp"), [(119.9996, "000200.000"), (86399.9999, "000000.000"), (3661.5, "010101.500")]
+)
+def test_nmea_is_rounded_before_it_is_written(at, stamp, log):
+    """It had seconds of 60.000 and a heading of 360.000."""
+    answers = []
+    Session(f"replay:{log}@max", PLACE, "navigation", every=1e-3).run([lambda a, answer, n: answers.append(answer)])
+    north = replace(answers[-1], time=at, C_nb=dcm_from_euler(2.0 * np.pi - 1e-8, 0.0, 0.0))
+    heading, attitude = nmea_lines(north)
+    assert heading.startswith("$HEHDT,0.0000,T")
+    assert attitude.split(",")[1:3] == [stamp, "0.000"]
 
 
 @pytest.mark.slow

@@ -35,10 +35,12 @@ def nmea_lines(answer: Answer) -> list[str]:
         return []
     heading, pitch, roll = np.degrees(answer.euler)
     sigma = np.degrees(answer.sigma)
-    hours, rest = divmod(answer.time % 86400.0, 3600.0)
-    stamp = f"{int(hours):02d}{int(rest // 60):02d}{rest % 60:06.3f}"
-    attitude = f"{heading:.3f},T,{roll:+.3f},{pitch:+.3f},,{sigma[2]:.3f},{sigma[1]:.3f},{sigma[0]:.3f},0,1"
-    return [_sentence(f"HEHDT,{heading:.4f},T"), _sentence(f"PASHR,{stamp},{attitude}")]
+    minutes, ms = divmod(round(answer.time * 1000.0) % 86_400_000, 60_000)  # rounded first: no second is 60.000
+    stamp = f"{minutes // 60:02d}{minutes % 60:02d}{ms / 1000.0:06.3f}"
+    attitude = (
+        f"{round(heading, 3) % 360.0:.3f},T,{roll:+.3f},{pitch:+.3f},,{sigma[2]:.3f},{sigma[1]:.3f},{sigma[0]:.3f},0,1"
+    )
+    return [_sentence(f"HEHDT,{round(heading, 4) % 360.0:.4f},T"), _sentence(f"PASHR,{stamp},{attitude}")]
 
 
 def _sentence(text: str) -> str:

@@ -75,7 +75,7 @@ def geojson(result: Exported) -> str:
 
 
 def kml(result: Exported) -> str:
-    """The track as a line at its height (KML 2.2)."""
+    """The track as a line at its height (KML 2.2, which takes heights above the sea; ours are above the ellipsoid, and it says so)."""
     strings = "".join(
         f"<LineString><altitudeMode>absolute</altitudeMode><coordinates>"
         f"{' '.join(','.join(f'{x:.8f}' if i < 2 else f'{x:.3f}' for i, x in enumerate(point)) for point in line)}"
@@ -84,7 +84,9 @@ def kml(result: Exported) -> str:
     )
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
-        f"<name>{html.escape(result.source, quote=False)}</name><Placemark><name>track</name>"
+        f"<name>{html.escape(result.source, quote=False)}</name>"
+        "<description>Heights are above the WGS 84 ellipsoid. Above the sea they differ by the geoid, up to 106 m.</description>"
+        "<Placemark><name>track</name>"
         f"<MultiGeometry>{strings}</MultiGeometry></Placemark></Document></kml>\n"
     )
 
