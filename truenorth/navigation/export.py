@@ -75,7 +75,7 @@ def geojson(result: Exported) -> str:
 
 
 def kml(result: Exported) -> str:
-    """The track as a line at its height (KML 2.2). KML takes heights above the sea; it is said that ours are above the ellipsoid."""
+    """The track as a line at its height (KML 2.2, whose heights are above the sea: it is said that ours are not)."""
     strings = "".join(
         f"<LineString><altitudeMode>absolute</altitudeMode><coordinates>"
         f"{' '.join(','.join(f'{x:.8f}' if i < 2 else f'{x:.3f}' for i, x in enumerate(point)) for point in line)}"
