@@ -10,6 +10,7 @@ from truenorth import Position, align
 from truenorth.aiding.aids import Gnss, Odometer
 from truenorth.alignment.in_motion_speed import speed_at
 from truenorth.coarse.odometer import gnss_track
+from truenorth.live import GnssFeed
 from truenorth.navigation.stops import _speed_of_places
 
 
@@ -69,3 +70,13 @@ def test_alignment(drive, elsewhere, aid):
     assert there.status == here.status
     np.testing.assert_allclose(there.C_nb, here.C_nb, atol=1e-7)
     np.testing.assert_allclose(there.moving.P, here.moving.P, rtol=1e-4, atol=1e-12)
+
+
+def test_a_live_receiver_that_stands_there_stands():
+    """Its place was the mean of plus and minus 180 degrees, and fixes on the other side had left it."""
+    rng = np.random.default_rng(1)
+    lon = np.pi + 1.5e-7 * rng.standard_normal(40)
+    feed = GnssFeed()
+    feed.push(np.arange(40.0), np.full(40, 0.5), np.arctan2(np.sin(lon), np.cos(lon)), np.full(40, 10.0))
+    assert abs(abs(feed.place.lon) - np.pi) < 1e-6
+    np.testing.assert_array_equal(feed.speed_of(feed.rows), 0.0)

@@ -83,6 +83,8 @@ def judged(
     reached = [] if verdict.finding == "inconsistent" else _reached(answer, verdict, heading_limit, remedies)
     status: Status = verdict.status("aligned")  # type: ignore[assignment]  # a finding, its good one so called
     taken = _taken_to_stay(answer) if stays and status == "aligned" else []
+    if reached and -answer.C_nb[2, 2] > limit("upside down"):
+        reached = [*reached, note("level.upside_down")]
     return replace(answer, status=status, evidence=(*reached, *verdict.evidence, *taken))
 
 
@@ -336,6 +338,4 @@ def _good(answer: Alignment, sigma: float, floor: float, level: float) -> list[E
         found.append(note(key, pays_until=answer.pays_until, duration=answer.duration))
     if answer.near_vertical:
         found.append(note("heading.vertical"))
-    if -answer.C_nb[2, 2] > limit("upside down"):
-        found.append(note("level.upside_down"))
     return found

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
-from truenorth.core.position import Position
+from truenorth.core.position import Position, eastward
 from truenorth.live.feed import Feed, or_none, table
 from truenorth.records import GnssRecord, HeightRecord, OdometerRecord, VelocityRecord
 from truenorth.state.mounting import Mounting
@@ -100,13 +100,16 @@ class GnssFeed(Feed):
         fixes = self.rows[np.isfinite(self.rows[:, 1:3]).all(axis=1), 1:4]
         if not len(fixes):
             return None
-        lat, lon, alt = np.median(np.nan_to_num(fixes), axis=0)
-        return Position(float(lat), float(lon), float(alt), 10.0, 20.0)
+        lon = np.unwrap(fixes[:, 1])  # across the date line, too
+        lat, lon, alt = np.median(np.nan_to_num(np.column_stack([fixes[:, 0], lon, fixes[:, 2]])), axis=0)
+        return Position(float(lat), float(eastward(lon, 0.0)), float(alt), 10.0, 20.0)
 
     @staticmethod
     def _metres(rows: Array) -> Array:
         scale = 6.371e6  # metres to a radian, about: moved or not
-        return np.column_stack([rows[:, 1] * scale, rows[:, 2] * scale * np.cos(rows[:, 1])])
+        lon = rows[:, 2]
+        east = eastward(lon, lon[np.argmax(np.isfinite(lon))])
+        return np.column_stack([rows[:, 1] * scale, east * scale * np.cos(rows[:, 1])])
 
     def fresh(self, rows: Array) -> Array:
         """See :class:`Feed`: fixes with place and velocity of the row before, to the last digit, as noise never has them.
