@@ -15,6 +15,7 @@ from truenorth.alignment.against import against
 from truenorth.alignment.answer import answer_of, at_epoch, without_heading
 from truenorth.alignment.assumptions import FADING, STATIONARY, STAYING, Published, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
+from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
 from truenorth.alignment.brief_sway import bent_by_heading, may_swing_on_lines
 from truenorth.alignment.by_heave import weighed_by_heave
@@ -372,12 +373,15 @@ def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, 
     found = stationary_align(task, C_n0_i, StaticModel.of(used), P, method)
     answer = at_epoch(task, used, where, found.C_n0_b, found.covariance, found.floor)
     known = ~np.isnan(found.bias[3:])
+    accel_bias, accel_sigma = true_bias(
+        found.bias[3:], found.bias_sigma[3:] ** 2, P.diagonal()[3:], answer.imu.bias_variance[3:]
+    )
     return replace(
         answer,
         gyro_bias=found.bias[:3],
         gyro_bias_sigma=found.bias_sigma[:3],
-        accel_bias=np.where(known, found.bias[3:], answer.accel_bias),
-        accel_bias_sigma=np.where(known, found.bias_sigma[3:], answer.accel_bias_sigma),
+        accel_bias=np.where(known, accel_bias, answer.accel_bias),
+        accel_bias_sigma=np.where(known, accel_sigma, answer.accel_bias_sigma),
     )
 
 
