@@ -179,6 +179,16 @@ def pays_until(history: History, answer: Alignment, fine: FineAlignment) -> floa
     return wanted if wanted < FARTHEST * elapsed[-1] else None
 
 
+def of_level_alone(answer: Alignment, more: Array | float = 0.0) -> Alignment:
+    """The same answer and history, with nothing known of heading; `more`, (3, 3) rad^2, is added to the covariance of both."""
+    found, history = answer, answer.history
+    if history is not None:
+        covariance, floor = (without_heading(P + more) for P in (history.phi_covariance, history.phi_floor))
+        found = replace(found, history=replace(history, phi_covariance=covariance, phi_floor=floor))
+    covariance, floor = (without_heading(P + more) for P in (answer.phi_covariance, answer.phi_floor))
+    return replace(found, phi_covariance=covariance, phi_floor=floor)
+
+
 def without_heading(covariance: Array) -> Array:
     """The same covariance of level, with nothing known of heading."""
     result = covariance.copy()

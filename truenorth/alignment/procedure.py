@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.against import against
-from truenorth.alignment.answer import answer_of, at_epoch, without_heading
+from truenorth.alignment.answer import answer_of, at_epoch, of_level_alone
 from truenorth.alignment.assumptions import FADING, STATIONARY, STAYING, Published, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
@@ -246,13 +246,7 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     fine = turning_align(task, used, np.array([task.epoch.row]))
     answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
     apart = (fine.scatter + coloured_level(fine, used, task.gravity)) * np.eye(3)
-    answer = replace(
-        answer,
-        phi_covariance=without_heading(answer.phi_covariance + apart),
-        phi_floor=without_heading(answer.phi_floor + apart),
-        pays_until=None,
-        handover=None,
-    )
+    answer = replace(of_level_alone(answer, apart), pays_until=None, handover=None)
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
     way = strays(fine, task.position, used.gyro_random_walk)
     steps = level_step_evidence(fine, used) + end_evidence(fine) + away_notes(fine.away)
