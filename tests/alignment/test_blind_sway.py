@@ -11,7 +11,7 @@ from tests.runs import some
 from truenorth.alignment import align
 from truenorth.alignment.turning import sway_walks
 from truenorth.campaign.fault_benches import BENCHES, misses
-from truenorth.core.attitude import misalignment
+from truenorth.core.attitude import UNIFORM_SIGMA, misalignment
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
@@ -41,6 +41,10 @@ def test_level_of_a_ship_by_gyros_that_do_not_see_the_earth_turn(imu: str, given
     answer = align(record, place, imu if given else None)
     assert answer.status == "level_only", answer.reasons
     assert np.max(np.abs(misses(answer, truth)["level"])) < 4.0
+    # The heading of the history is a convention as the answer's is: it was stated to 2 to 20 deg.
+    assert answer.history is not None
+    np.testing.assert_allclose(answer.history.phi_covariance[:, 2, 2], UNIFORM_SIGMA**2)
+    np.testing.assert_allclose(answer.history.phi_covariance[-1], answer.phi_covariance, rtol=1e-2)
 
 
 @pytest.mark.parametrize("seed", some([4], [5, 6, 7]))

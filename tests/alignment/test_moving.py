@@ -6,10 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from truenorth.alignment.moving import Moving
-from truenorth.core.attitude import dcm_from_rotation_vector, skew
+from truenorth.alignment.in_motion_answer import less_sure_all_along
+from truenorth.alignment.in_motion_spread import Spread
+from truenorth.alignment.moving import Moving, moving_of
+from truenorth.alignment.result import History
+from truenorth.core.attitude import UNIFORM_SIGMA, dcm_from_euler, dcm_from_rotation_vector, skew
 from truenorth.core.earth import EARTH_RATE, radii
 from truenorth.state.layout import BG, DP, DV, PHI
+from truenorth.state.track import Track
 
 V, WAY = np.array([3.0, -8.0, 0.5]), np.array([900.0, -1400.0])
 
@@ -70,3 +74,48 @@ def test_a_larger_sigma_of_velocity_is_an_error_of_its_own():
     np.testing.assert_allclose(np.diag(larger.P)[DV], 1.3**2 * np.diag(known.P)[DV])
     np.testing.assert_allclose(np.diag(larger.P)[DP], 1.2**2 * np.diag(known.P)[DP])
     np.testing.assert_array_equal(larger.P[2], known.P[2])
+
+
+def _drive():
+    """A track of 200 s in bends, whose filter is sure of all, and its history."""
+    time = np.arange(200.0)
+    heading = 0.5 * np.sin(0.05 * time) + 0.01 * time
+    v_n = 8.0 * np.stack([np.sin(heading), np.cos(heading), 0.0 * time], axis=1)
+    way = np.cumsum(v_n, axis=0) - v_n[0]
+    R_M, R_N = radii(0.8)
+    place = np.stack([0.8 + way[:, 1] / R_M, 0.3 + way[:, 0] / (R_N * math.cos(0.8)), 0.0 * time], axis=1)
+    C_nb = np.stack([dcm_from_euler(h, 0.0, 0.0) for h in heading])
+    track = Track.of_motion(time, C_nb, v_n, place)
+    track = Track(**{**vars(track), "P": np.broadcast_to(1e-8 * np.eye(15), (len(time), 15, 15))})
+    none, phi = np.zeros((len(time), 3)), track.P[:, PHI, PHI]
+    return track, way, History(time, C_nb, phi, 0.0 * phi, none, none, none + 1e-9, none, none, none, none, time)
+
+
+@pytest.mark.parametrize("off", [0.3, UNIFORM_SIGMA])
+def test_a_heading_that_nothing_shows_is_unsure_all_along_the_track(off):
+    """Of a wheel's track alone the filter was sure: velocity was up to 16, place 6 sigmas off on the way, and heading 213."""
+    track, way, history = _drive()
+    spread = Spread(np.diag([0.0, 0.0, off**2]))
+    moving, less_sure = less_sure_all_along(moving_of(track, 0.0, "motion", None).turned(off**2), history, spread)
+    phi = np.linspace(-1.0, 1.0, 201) * math.sqrt(3.0) * off  # evenly, with that sigma
+    C = dcm_from_rotation_vector(-phi[:, None] * [0.0, 0.0, 1.0])
+    for part, true in ((DV, track.v_n), (DP, way)):
+        error = np.mean(np.sum((true @ np.swapaxes(C, 1, 2) - true)[..., :2] ** 2, axis=2), axis=0)
+        known = moving.track.P[:, part, part][:, [0, 1], [0, 1]].sum(axis=1)
+        assert np.all(known >= 0.95 * error)
+    np.testing.assert_allclose(moving.track.P[:, 2, 2], off**2, rtol=1e-6)
+    np.testing.assert_allclose(less_sure.phi_covariance[:, 2, 2], off**2, rtol=1e-6)
+    north = np.sqrt(np.sum(less_sure.gyro_bias_sigma**2, axis=1))
+    np.testing.assert_allclose(north, off * EARTH_RATE * np.cos(track.position[:, 0]), rtol=1e-3)
+    np.testing.assert_allclose(moving.track.P[-1], moving.P, atol=1e-6)
+
+
+def test_where_places_are_measured_heading_alone_is_less_sure():
+    track, _, history = _drive()
+    spread = Spread(np.diag([1e-4, 2e-4, 0.1]))
+    moving, less_sure = less_sure_all_along(moving_of(track, 0.0, "motion", None), history, spread)
+    more = moving.track.P - track.P
+    np.testing.assert_allclose(more[:, PHI, PHI], np.broadcast_to(spread.moment, (len(track), 3, 3)), atol=1e-12)
+    np.testing.assert_allclose(less_sure.phi_covariance - history.phi_covariance, more[:, PHI, PHI], atol=1e-12)
+    assert not more[:, 3:].any()
+    np.testing.assert_array_equal(less_sure.gyro_bias_sigma, history.gyro_bias_sigma)

@@ -14,7 +14,7 @@ from truenorth.alignment import align
 from truenorth.alignment.positions import align_positions, find_positions
 from truenorth.alignment.task import deflection_covariance
 from truenorth.alignment.touched import find_touch
-from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.attitude import UNIFORM_SIGMA, rotation_vector_from_dcm
 from truenorth.core.earth import normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
@@ -175,6 +175,7 @@ def test_industrial_gyros_touch_no_table():
     for seed in range(7):
         answer = align_positions(turned([(0, math.pi / 2)], spec, seed, 240.0)[0].record, PLACE, spec)
         assert answer.status == "level_only", answer.reasons
+        np.testing.assert_allclose(answer.history.phi_covariance[:, 2, 2], UNIFORM_SIGMA**2)
 
 
 def test_positions_are_found_in_the_gyros():

@@ -1,6 +1,7 @@
 """A still base whose biases wander as Gauss-Markov processes of 100 s, as others simulate them: level is what its sigma says."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -76,6 +77,40 @@ def test_level_of_biases_that_wander(grade, given, runs):
         off = np.array([answer.heading, answer.pitch, answer.roll]) - attitude
         off[0] = math.remainder(off[0], 2.0 * math.pi)
         assert np.all(np.abs(off) < 4.0 * answer.euler_sigma)
+
+
+@pytest.mark.parametrize("at", some([120.0], [40.0, 70.0]), ids=lambda at: f"at {at:g} s")
+@pytest.mark.parametrize("said", ["nothing", "wander", "walk"])
+@few_and_all(100, few=16)
+def test_a_bias_by_the_mean_is_off_by_what_it_has_wandered(at, said, runs):
+    """Gyros that see no north: the mean of a log is not their bias at the epoch, and sigma was that of the mean.
+
+    The RMS of three ratios a log is within a band that normal ones leave once in 10,000 sets.
+    """
+    spec, rows, rate = imu_spec("consumer"), 600, 5.0
+    rng = np.random.default_rng([runs, int(at)])
+    walks = said == "walk"
+    step = spec.gyro_bias_instability * math.sqrt(
+        2.0 / spec.correlation_time
+    )  # of a walk that begins as the process does
+    keep = 1.0 if walks else math.exp(-1.0 / (rate * spec.correlation_time))
+    spread = step / math.sqrt(rate) if walks else spec.gyro_bias_instability * math.sqrt(1.0 - keep**2)
+    shares = {"gyro_bias_instability": 0.0, "gyro_rate_random_walk": step} if walks else {}
+    given = None if said == "nothing" else replace(spec, **shares)
+    ratios = []
+    for _ in range(runs):
+        steps = spread * rng.standard_normal((rows, 3))
+        steps[0] = spec.gyro_bias_instability * rng.standard_normal(3)
+        bias = np.radians([0.1, -0.2, 0.15]) + lfilter([1.0], [1.0, -keep], steps, axis=0)
+        white = math.sqrt(rate) * rng.standard_normal((2, rows, 3))
+        force = [0.0, 0.0, float(normal_gravity(0.7, 0.0))] + spec.accel_random_walk * white[1]
+        gyros = earth_rate_n(0.7) + bias + spec.gyro_random_walk * white[0]
+        answer = align(
+            ImuRecord(np.arange(1, rows + 1) / rate, gyros, force), (math.degrees(0.7), 10.0, 0.0), given, at=at
+        )
+        assert answer.status == "level_only"
+        ratios.append((answer.gyro_bias - bias[round(at * rate) - 1]) / answer.gyro_bias_sigma)
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=3.9 / math.sqrt(6 * runs))
 
 
 def flat_allan(rng, size, rows):

@@ -5,7 +5,7 @@ import pytest
 
 from truenorth.errors.axes import standing
 from truenorth.errors.model import InsModel
-from truenorth.errors.whole_bias import taken_apart, time_average
+from truenorth.errors.whole_bias import about_average, taken_apart, time_average
 from truenorth.records.specs import imu_spec
 from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 from truenorth.state.prior import WholeBiases
@@ -20,6 +20,14 @@ def test_time_average_is_that_of_the_sampled_process(x):
     sampled = np.exp(-np.abs(t[:, None] - t))
     assert time_average(x)[0] == pytest.approx(sampled.mean(), rel=1e-5)
     assert time_average(x)[1] == pytest.approx(np.exp(t - x).mean(), rel=1e-5)
+
+
+@pytest.mark.parametrize(("before", "after"), [(1e-4, 1e-4), (0.4, 0.0), (0.0, 0.4), (1.5, 0.5), (30.0, 10.0)])
+def test_a_value_about_the_mean_is_that_of_the_sampled_process(before, after):
+    t = (np.arange(2000) + 0.5) * (before + after) / 2000
+    mean = np.exp(-np.abs(t[:, None] - t)).mean()
+    sampled = 1.0 + mean - 2.0 * np.exp(-np.abs(t - before)).mean()
+    assert about_average(before, after) == pytest.approx(sampled, rel=1e-3)
 
 
 def test_parts_are_those_of_the_joint_gaussian():

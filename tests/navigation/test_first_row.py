@@ -59,3 +59,62 @@ def test_a_start_in_the_last_rows_has_nothing_to_go_on_with(rows):
     record = simulate(SHIP, rate=50.0, duration=20.0, imu=SPEC).record
     with pytest.raises(tn.DataError, match="goes on from it"):
         tn.navigate(record, start_at(float(record.time[-1]) - rows * record.interval), imu=SPEC)
+
+
+def _lost_after(start, lost, kind, slack=1e-6):
+    """The ship's log without the rows of a while after the start's epoch."""
+    record = simulate(SHIP, rate=25.0, duration=8.0, imu=SPEC, seed=2, kind=kind).record
+    keep = (record.time < start + slack) | (record.time > start + lost + slack)
+    return tn.ImuRecord(record.time[keep], record.gyro[keep], record.accel[keep], kind)
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("lost", [0.04, 0.2, 0.8])
+def test_rows_that_are_lost_right_after_the_epoch_are_bridged_and_counted(lost, kind):
+    """The first row was taken for the next one: velocity was 7 to 538 sigmas off live, in silence, and of a whole log as well."""
+    record, start = _lost_after(2.0, lost, kind), start_at(2.0, within=False)
+    whole = tn.navigate(record, start, imu=SPEC, altitude="free")
+    run = Navigator(start, SPEC, kind=kind, altitude="free")
+    run.push(record.time, record.gyro, record.accel)
+    for time, C_nb, v_n, sigma in (
+        (whole.time[-1], whole.C_nb[-1], whole.v_n[-1], whole.track.sigma[-1]),
+        (
+            run.answer.time,
+            run.answer.C_nb,
+            run.answer.motion.v_n,
+            np.append(run.answer.sigma, run.answer.motion.v_sigma),
+        ),
+    ):
+        true = SHIP.states(time)
+        assert np.abs(misalignment(C_nb, true.C_nb)).max() < 4.0 * sigma[:3].max()
+        assert np.abs((v_n - true.v_n) / sigma[3:6]).max() < 4.0
+    assert len(whole.gaps) == len(run._loop.gaps) == (lost > 0.04)  # of one row the made one takes the place
+    at_once = tn.navigate(_lost_after(2.0, 0.0, kind), start, imu=SPEC, altitude="free").track
+    assert lost < 0.5 or whole.track.sigma[-1, 3] > 2.0 * at_once.sigma[-1, 3]
+    if lost > 0.04:
+        assert run.finish().gaps == pytest.approx(np.array(whole.gaps))
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+def test_a_gap_right_after_the_epoch_that_is_too_long_is_refused(kind):
+    record, start = _lost_after(2.0, 1.2, kind), start_at(2.0, within=False)
+    with pytest.raises(tn.DataError, match=r"expected gaps of 1 s at most"):
+        tn.navigate(record, start, imu=SPEC, altitude="free")
+    run = Navigator(start, SPEC, kind=kind, altitude="free")
+    run.push(record.time, record.gyro, record.accel)
+    assert run.answer is None
+    assert "expected 1 s at most" in run.failure
+
+
+def test_rows_that_come_late_fill_a_gap_right_after_the_epoch():
+    """Rows out of order by less than a second: the loop waits for them, and is the one of rows in order, to the bit."""
+    record, start = _lost_after(2.0, 0.0, "increments"), start_at(2.0, within=False)
+    late = (record.time > 2.02) & (record.time < 2.51)
+    now = (record.time > 2.51) & (record.time < 3.01)
+    one, other = (Navigator(start, SPEC, kind="increments", altitude="free") for _ in range(2))
+    for rows in (record.time < 2.02, now, late, record.time > 3.01):
+        one.push(record.time[rows], record.gyro[rows], record.accel[rows])
+    other.push(record.time, record.gyro, record.accel)
+    assert one._loop.gaps == []
+    np.testing.assert_array_equal(one.answer.C_nb, other.answer.C_nb)
+    np.testing.assert_array_equal(one.answer.motion.v_n, other.answer.motion.v_n)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.fine import FineAlignment, attitude_history
 from truenorth.alignment.handover import hand_over
+from truenorth.alignment.inference import INFERRED, told_apart
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import UNIFORM_SIGMA
@@ -42,6 +43,7 @@ def at_epoch(
 
 def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Array, floor: Array) -> Alignment:
     """An answer in navigation axes, with biases as specified and no verdict yet."""
+    spec = told_apart(spec, task.gravity) if where == INFERRED else spec
     prior = np.sqrt(spec.bias_variance)
     return Alignment(
         status="not_converged",
@@ -96,12 +98,13 @@ def answer_of(
     answer = at_epoch(task, used, where, *fine.misalignment_at(C_ib, task.epoch.elapsed))
     if sways:
         answer = replace(answer, phi_covariance=answer.phi_covariance + creep(task, task.record.duration))
-    history = make_history(task, fine, used, sways)
+    proper = answer.imu.bias_variance[3:]
+    history = make_history(task, fine, proper, sways)
     if bent is not None:
         answer = replace(answer, phi_covariance=answer.phi_covariance + bent)
         history = replace(history, phi_covariance=history.phi_covariance + bent)
     variance, prior = fine.P.diagonal(), P_bias.diagonal()[3:]
-    accel_bias, accel_sigma = true_bias(fine.bias[3:], variance[BA], prior, used.bias_variance[3:])
+    accel_bias, accel_sigma = true_bias(fine.bias[3:], variance[BA], prior, proper)
     return replace(
         answer,
         gyro_bias=fine.bias[:3],
@@ -127,15 +130,18 @@ def creep(task: Task, elapsed: Array | float) -> Array:
     return result
 
 
-def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = False) -> History:
-    """How a filter came to its answer, in navigation axes; on a base that sways with the allowance for its creep."""
+def make_history(task: Task, fine: FineAlignment, proper: Array, sways: bool = False) -> History:
+    """How a filter came to its answer, in navigation axes; on a base that sways with the allowance for its creep.
+
+    `proper` is the variance of the accelerometers' biases proper, (3,) (m/s^2)^2.
+    """
     C_nb, covariance, floor = attitude_history(fine, task.position.lat)
     if sways:
         covariance = covariance + creep(task, fine.integrals.time[1:])
     e = fine.estimates
     bias, variance = fine.taken[BIASES] + e.x[:, BIASES], e.P[:, BA, BA].diagonal(axis1=1, axis2=2)
     prior = fine.system.P0.diagonal()[BA]
-    accel_bias, accel_sigma = true_bias(bias[:, 3:], variance, prior, used.bias_variance[3:])
+    accel_bias, accel_sigma = true_bias(bias[:, 3:], variance, prior, proper)
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],
         C_nb=C_nb,
@@ -171,6 +177,16 @@ def pays_until(history: History, answer: Alignment, fine: FineAlignment) -> floa
         return None
     wanted = float(elapsed[-1] * (0.5 * floor / random[-1]) ** (1.0 / slope))
     return wanted if wanted < FARTHEST * elapsed[-1] else None
+
+
+def of_level_alone(answer: Alignment, more: Array | float = 0.0) -> Alignment:
+    """The same answer and history, with nothing known of heading; `more`, (3, 3) rad^2, is added to the covariance of both."""
+    found, history = answer, answer.history
+    if history is not None:
+        covariance, floor = (without_heading(P + more) for P in (history.phi_covariance, history.phi_floor))
+        found = replace(found, history=replace(history, phi_covariance=covariance, phi_floor=floor))
+    covariance, floor = (without_heading(P + more) for P in (answer.phi_covariance, answer.phi_floor))
+    return replace(found, phi_covariance=covariance, phi_floor=floor)
 
 
 def without_heading(covariance: Array) -> Array:

@@ -19,12 +19,13 @@ from truenorth.alignment.inference import allan_noise, specification
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import Task, last_part, level_of
 from truenorth.alignment.turning import turning_noise
-from truenorth.alignment.usual import usual
+from truenorth.alignment.usual import usual, wandering_as_usual
 from truenorth.coarse import analytic
 from truenorth.coarse.analytic import BLOCKS, Means, scatter_of, static_covariance
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError
 from truenorth.errors.staying import StaticModel
+from truenorth.errors.whole_bias import about_average
 from truenorth.quality.own_velocity import own_velocity
 from truenorth.records.specs import ImuSpec
 from truenorth.state.limits import limit
@@ -87,7 +88,7 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
             f"{task.record.source}: all gyros read zero in every row: are they dead, or written too coarsely to see any motion?"
         )
     check = check_means(task.means, task.position.lat, task.gravity)
-    used, where = specification(spec, check, lambda: _louder(allan_noise(task.record), turning_noise(task.record)))
+    used, where = specification(spec, check, lambda: _blind_noise(task))
     moves = _wander(task, used) > _drift(task, used)
     check = whole if steady else _check(task, task.means, moves)
     means, moved = _at_the_epoch(task, used)
@@ -100,7 +101,8 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     up = C_nb[2]
     level_rate = EARTH_RATE * math.cos(task.position.lat)
     own = float(np.linalg.norm(task.means.w_ib_b)) if moves else 0.0
-    bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2) + own**2)
+    variance = np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2) + own**2
+    bias_sigma = np.sqrt(variance + _wandered(task, used))
     bias = task.means.w_ib_b - EARTH_RATE * math.sin(task.position.lat) * up
     return replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma, disturbance=_own_velocity(task)), check
 
@@ -108,6 +110,20 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
 def _own_velocity(task: Task) -> Array:
     """(3,) RMS velocity of the base's own motion, m/s; what is faster than any base is tilt."""
     return np.minimum(own_velocity(task.record), limit("fastest base"))
+
+
+def _wandered(task: Task, spec: ImuSpec) -> float:
+    """Variance of the gyros' bias at the epoch about its mean over the log, (rad/s)^2: it wanders within it."""
+    before, whole = task.epoch.elapsed, task.record.duration
+    after = max(whole - before, 0.0)
+    bounded = about_average(before / spec.correlation_time, after / spec.correlation_time)
+    walk = (before**3 + after**3) / (3.0 * whole**2)  # of a random walk, Brownian motion about its mean
+    return spec.gyro_bias_instability**2 * bounded + spec.gyro_rate_random_walk**2 * walk
+
+
+def _blind_noise(task: Task) -> StaticModel:
+    """Random walks of a log of gyros that do not see the earth turn; biases wander as is usual: minutes hardly show it."""
+    return wandering_as_usual(_louder(allan_noise(task.record), turning_noise(task.record)), promised=True)
 
 
 def _louder(a: StaticModel, b: StaticModel) -> StaticModel:

@@ -9,7 +9,7 @@ import numpy as np
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import departures
 from truenorth.alignment.in_motion_task import MovingTask
-from truenorth.alignment.moving import fifteen, moving_of
+from truenorth.alignment.moving import Moving, fifteen, gone, moving_of, off_by_heading, turning
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import deflection_covariance
 from truenorth.core.attitude import UNIFORM_SIGMA
@@ -43,8 +43,9 @@ def moving_answer(
             "axes and units, and the specification `imu`"
         ) from None
     history = _history(track, task)
-    apart = spread.covariance(float(history.phi_covariance[-1][2, 2]))
-    covariance = history.phi_covariance[-1] + apart
+    own = history.phi_covariance
+    apart = spread.covariance(float(own[-1][2, 2]))
+    covariance = own[-1] + apart
     covariance[2, 2] = min(covariance[2, 2], UNIFORM_SIGMA**2)
     sensor = "odometer" if isinstance(task.odometer, OdometerRecord) else "velocity log"
     mounting = None if task.odometer is None else (sensor, task.wheel.C_mb, task.wheel.lever_arm)
@@ -57,7 +58,7 @@ def moving_answer(
     delays = delays_found(track, {"GNSS": task.antenna, "odometer": task.wheel, "velocity log": task.wheel})
     before = np.diag(moving.P)[BG]
     # Navigation goes on from there: what heading is less sure of belongs to it, too.
-    less_sure = covariance[2, 2] - history.phi_covariance[-1][2, 2]
+    less_sure = covariance[2, 2] - own[-1][2, 2]
     if task.gnss is None and not task.more:
         moving = moving.turned(less_sure)
         position = replace(position, horizontal_sigma=float(np.sqrt(np.diag(moving.P)[DP][:2].max())))
@@ -67,6 +68,9 @@ def moving_answer(
     gyro_more = np.diag(moving.P)[BG] - before
     clocks = rates_found(track, task.antenna)
     moving = replace(moving, delays=delays, clocks=clocks, acting_bias=track.accel_bias[-1])
+    gyro_bias_sigma = np.sqrt(history.gyro_bias_sigma[-1] ** 2 + gyro_more)
+    if spread.moment.any():
+        moving, history = less_sure_all_along(moving, history, spread)
     return Alignment(
         status="not_converged",
         evidence=(),
@@ -77,7 +81,7 @@ def moving_answer(
         phi_covariance=covariance,
         phi_floor=history.phi_floor[-1],
         gyro_bias=track.gyro_bias[-1],
-        gyro_bias_sigma=np.sqrt(history.gyro_bias_sigma[-1] ** 2 + gyro_more),
+        gyro_bias_sigma=gyro_bias_sigma,
         gyro_bias_prior=prior[:3],
         accel_bias=history.accel_bias[-1],
         accel_bias_sigma=history.accel_bias_sigma[-1],
@@ -91,6 +95,22 @@ def moving_answer(
         source=task.record.source,
         moving=moving,
     )
+
+
+def less_sure_all_along(moving: Moving, history: History, spread: Spread) -> tuple[Moving, History]:
+    """The track and the history with what other guesses of heading make of every epoch, not of the last alone."""
+    track, known = moving.track, history.phi_covariance
+    apart = np.stack([spread.covariance(heading) for heading in known[:, 2, 2].tolist()])
+    P, gyro_sigma = track.P.copy(), history.gyro_bias_sigma
+    if moving.in_body:
+        way = gone(track.position[0], track.position)
+        turn = turning(P.shape[-1], track.v_n, way, track.C_nb, track.position[:, 0])
+        P = off_by_heading(P, apart[:, 2, 2], turn)
+        gyro_sigma = np.hypot(gyro_sigma, np.sqrt(apart[:, 2, 2])[:, None] * turn[:, BG])
+    else:
+        P[:, PHI, PHI] += apart
+    history = replace(history, phi_covariance=known + apart, gyro_bias_sigma=gyro_sigma)
+    return replace(moving, track=replace(track, P=P)), history
 
 
 def _history(track: Track, task: MovingTask) -> History:

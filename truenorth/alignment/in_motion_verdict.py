@@ -6,6 +6,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.verdict import claimed, judged
 from truenorth.estimate.rivals import counted_once
 from truenorth.quality.innovations import innovation_evidence
+from truenorth.quality.mounting import RECEIVER, mounting_evidence
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.limits import is_estimated
 from truenorth.state.track import Track
@@ -18,6 +19,7 @@ def judge_moving(answer: Alignment, track: Track, limit: float, more: list[Evide
     if by_motion:
         needs = ("manoeuvre_gnss" if any("GNSS" in r.name for r in track.residuals) else "north",)
     evidence = [*_wheel(answer), *innovation_evidence(track.residuals, claimed(answer), by_motion=by_motion), *more]
+    evidence += mounting_evidence(track, (RECEIVER,))
     return judged(answer, counted_once(evidence), limit, waiting=not by_motion, remedies=needs)
 
 

@@ -6,6 +6,9 @@ population, and from what is usual of sensors with the random walk that the log 
 
 Random walks: by maximum likelihood of the filter (:mod:`truenorth.alignment.noise`), which separates them from the base's
 motion.
+
+The vertical force shows what acts as an accelerometer bias: the bias, and what a scale factor makes of gravity. The filter needs
+their sum; what the answer states is told apart (:func:`told_apart`).
 """
 
 from __future__ import annotations
@@ -105,6 +108,21 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
         accel_bias_instability=noise.accel_rate_walk * math.sqrt(0.5 * CORRELATION_TIME),
         correlation_time=CORRELATION_TIME,
     )
+
+
+def told_apart(spec: ImuSpec, gravity: float) -> ImuSpec:
+    """An inferred specification, its accelerometer bias told apart from what axes make of gravity (m/s^2).
+
+    The ratio is what is usual with such noise. Misalignments are taken for as large as scale factors: whatever the attitude, the
+    sum that acts stays what the log has shown. A specification with scale factors is one whose filter estimates them: it stays.
+    """
+    if spec.accel_scale_factor > 0.0:
+        return spec
+    bias = usual("accel", "bias", spec.accel_random_walk)
+    of_axes = gravity * usual("accel", "scale_factor", spec.accel_random_walk)
+    both = math.hypot(bias, of_axes)
+    axes = spec.accel_bias * of_axes / (both * gravity)
+    return replace(spec, accel_bias=spec.accel_bias * bias / both, accel_scale_factor=axes, accel_misalignment=axes)
 
 
 def specification(spec: ImuSpec | None, check: LogCheck, noise: Callable[[], StaticModel]) -> tuple[ImuSpec, str]:

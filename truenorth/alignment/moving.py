@@ -66,7 +66,7 @@ class Moving:
     vehicle_heading, vehicle_heading_sigma : float, rad
         Of the vehicle's forward axis; the IMU's own where no odometer says how it sits.
     track : Track
-        The whole way.
+        The whole way, each epoch as unsure of heading as the last. What evidence adds to sigma is in `P` alone.
     delays : mapping of sensor to (delay, sigma), s
         By which a sensor's stamps are late, where that was left open and the data show it.
     clocks : mapping of sensor to (rate, sigma), s/s
@@ -120,42 +120,19 @@ class Moving:
     def turned(self, heading: float) -> Moving:
         """The same state, heading less sure by this variance (rad^2), where no sensor shows velocity or place in n.
 
-        A wheel shows neither which way it rolls nor which way it came. A heading error ``h`` turns velocity, and the way since
-        the beginning, about the vertical: by ``sin h`` of them sideways, by ``1 - cos h`` backwards; and gyros are biased by what
-        that makes of the earth's rate (:mod:`truenorth.errors.azimuth_free`). Along the tangent all of it goes with ``h``, whole:
-        to navigation by the same sensors what is missing of velocity or bias would be heading seen. Backwards they go by no
-        heading, of a Gaussian of variance s^2
-
-            E (1 - cos h)^2 = 3/2 - 2 exp(-s^2 / 2) + exp(-2 s^2) / 2
-
-        and a log that shows the speed shows nothing of the way.
+        A wheel shows neither which way it rolls nor which way it came (:func:`off_by_heading`).
         """
-        whole = float(self.P[PHI, PHI][2, 2]) + heading
-        back = max(1.5 - 2.0 * math.exp(-0.5 * whole) + 0.5 * math.exp(-2.0 * whole), 0.0)
         turned = replace(self, in_body=True)
-        P = self.P + heading * np.outer(turned.turn, turned.turn)
-        for part, along in ((DV, self.v_n[:2]), (DP, self.gone)):
-            P[part, part][:2, :2] += back * np.outer(along, along)
+        P = off_by_heading(self.P, heading, turned.turn)
         return replace(turned, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
 
     @property
     def turn(self) -> Array:
         """(15 + m,) all that a heading error of one radian goes with, to first order."""
-        turn = np.zeros(len(self.P))
-        turn[PHI.stop - 1] = 1.0
-        if self.in_body:
-            for part, along in ((DV, self.v_n[:2]), (DP, self.gone)):
-                turn[part][:2] = along[1], -along[0]
-            north = EARTH_RATE * math.cos(float(self.track.position[-1, 0]))
-            turn[BG] = self.track.C_nb[-1].T @ [-north, 0.0, 0.0]
-        return turn
-
-    @property
-    def gone(self) -> Array:
-        """(2,) m; east and north, from the beginning of the track to its end."""
-        (lat, lon, alt), (lat0, lon0, _) = self.track.position[-1], self.track.position[0]
-        R_M, R_N = radii(0.5 * (lat + lat0))
-        return np.array([(R_N + alt) * math.cos(lat) * eastward(lon, lon0), (R_M + alt) * (lat - lat0)])
+        if not self.in_body:
+            return np.eye(len(self.P))[PHI.stop - 1]
+        last = self.track.position[-1]
+        return turning(len(self.P), self.v_n, gone(self.track.position[0], last), self.track.C_nb[-1], last[0])
 
     def summary(self) -> dict[str, Any]:
         """In datasheet units, ready for JSON."""
@@ -183,6 +160,49 @@ class Moving:
                 "wheel_arm_sigma_m": w.lever_arm_sigma.tolist(),
             }
         return result
+
+
+def turning(states: int, v_n: Array, way: Array, C_nb: Array, lat: Array) -> Array:
+    """(..., n) all that a heading error of one radian goes with, to first order, where no sensor shows velocity or place in n.
+
+    It turns velocity (..., 3), and the way since the beginning, (..., 2), about the vertical; and gyros are biased by what it makes
+    of the earth's rate (:mod:`truenorth.errors.azimuth_free`).
+    """
+    turn = np.zeros((*np.shape(lat), states))
+    turn[..., PHI.stop - 1] = 1.0
+    for part, along in ((DV, v_n), (DP, way)):
+        turn[..., part.start], turn[..., part.start + 1] = along[..., 1], -along[..., 0]
+    turn[..., BG] = -EARTH_RATE * np.cos(lat)[..., None] * C_nb[..., 0, :]
+    return turn
+
+
+def gone(begin: Array, place: Array) -> Array:
+    """(..., 2) m; east and north, from the place (3,) where a track begins to places (..., 3) of it."""
+    (lat, lon, alt), (lat0, lon0, _) = np.moveaxis(place, -1, 0), begin
+    R_M, R_N = radii(0.5 * (lat + lat0))
+    return np.stack([(R_N + alt) * np.cos(lat) * eastward(lon, lon0), (R_M + alt) * (lat - lat0)], axis=-1)
+
+
+def off_by_heading(P: Array, heading: Array | float, turn: Array) -> Array:
+    """Covariance (..., n, n) with heading less sure by a variance, rad^2, and all that goes with it.
+
+    Along the tangent (:func:`turning`) all of it goes with the heading error ``h``, whole: to navigation by the same sensors what
+    is missing of velocity or bias would be heading seen. Velocity and the way are off by ``sin h`` sideways, by ``1 - cos h``
+    backwards. Backwards they go by no heading, of a Gaussian of variance s^2
+
+        E (1 - cos h)^2 = 3/2 - 2 exp(-s^2 / 2) + exp(-2 s^2) / 2
+
+    and a log that shows the speed shows nothing of the way.
+    """
+    heading = np.asarray(heading)
+    whole = P[..., PHI.stop - 1, PHI.stop - 1] + heading
+    back = np.maximum(1.5 - 2.0 * np.exp(-0.5 * whole) + 0.5 * np.exp(-2.0 * whole), 0.0)
+    found = P + heading[..., None, None] * turn[..., :, None] * turn[..., None, :]
+    for part in (DV, DP):
+        level = slice(part.start, part.start + 2)
+        along = turn[..., level][..., ::-1] * [-1.0, 1.0]
+        found[..., level, level] += back[..., None, None] * along[..., :, None] * along[..., None, :]
+    return found
 
 
 def _signed(angle: float) -> float:

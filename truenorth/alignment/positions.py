@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.answer import at_epoch, without_heading
+from truenorth.alignment.answer import at_epoch, of_level_alone
 from truenorth.alignment.check import LogCheck, check_means, is_blind
 from truenorth.alignment.fine import FineAlignment, attitude_history
 from truenorth.alignment.inference import infer_spec
@@ -128,10 +128,6 @@ def align_positions(
         used, fine, x = wider, again, x_again
     C_n0_b, covariance, floor = fine.misalignment_at(fine.integrals.C_ib_at[0], task.epoch.elapsed)
     answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
-    if blind:
-        answer = replace(
-            answer, phi_covariance=without_heading(answer.phi_covariance), phi_floor=without_heading(answer.phi_floor)
-        )
     touch = _touched(task, fine, stretches, used)
     found = _positions(fine, stretches, position.lat)
     sigma = np.sqrt(np.diag(fine.P))
@@ -147,6 +143,7 @@ def align_positions(
         history=_history(task, fine),
         table=_errors(found, touch, prior, x, fine.P),
     )
+    answer = of_level_alone(answer) if blind else answer
     evidence = [] if touch is None else [touch.evidence(task.gravity)]
     evidence += leaves(_leaves(task.motion, stretches)) + base_evidence(answer, check, None, settled=fine.settled)
     return judged(answer, evidence, heading_limit)

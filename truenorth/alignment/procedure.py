@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.against import against
-from truenorth.alignment.answer import answer_of, at_epoch, without_heading
+from truenorth.alignment.answer import answer_of, at_epoch, of_level_alone
 from truenorth.alignment.assumptions import FADING, STATIONARY, STAYING, Published, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
+from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
 from truenorth.alignment.brief_sway import bent_by_heading, may_swing_on_lines
 from truenorth.alignment.by_heave import weighed_by_heave
@@ -245,13 +246,7 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     fine = turning_align(task, used, np.array([task.epoch.row]))
     answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
     apart = (fine.scatter + coloured_level(fine, used, task.gravity)) * np.eye(3)
-    answer = replace(
-        answer,
-        phi_covariance=without_heading(answer.phi_covariance + apart),
-        phi_floor=without_heading(answer.phi_floor + apart),
-        pays_until=None,
-        handover=None,
-    )
+    answer = replace(of_level_alone(answer, apart), pays_until=None, handover=None)
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
     way = strays(fine, task.position, used.gyro_random_walk)
     steps = level_step_evidence(fine, used) + end_evidence(fine) + away_notes(fine.away)
@@ -372,12 +367,15 @@ def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, 
     found = stationary_align(task, C_n0_i, StaticModel.of(used), P, method)
     answer = at_epoch(task, used, where, found.C_n0_b, found.covariance, found.floor)
     known = ~np.isnan(found.bias[3:])
+    accel_bias, accel_sigma = true_bias(
+        found.bias[3:], found.bias_sigma[3:] ** 2, P.diagonal()[3:], answer.imu.bias_variance[3:]
+    )
     return replace(
         answer,
         gyro_bias=found.bias[:3],
         gyro_bias_sigma=found.bias_sigma[:3],
-        accel_bias=np.where(known, found.bias[3:], answer.accel_bias),
-        accel_bias_sigma=np.where(known, found.bias_sigma[3:], answer.accel_bias_sigma),
+        accel_bias=np.where(known, accel_bias, answer.accel_bias),
+        accel_bias_sigma=np.where(known, accel_sigma, answer.accel_bias_sigma),
     )
 
 

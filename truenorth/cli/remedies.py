@@ -19,6 +19,7 @@ OPTIONS = {
     "imu_axes": "--axes",
     "slave_axes": "--axes",
     "mounting": "--mounting",
+    "baseline": "--baseline",
     "offset": "--offset {sensor}={offset:.3f}",
     "latency": "--latency {latency:.3f}",
     "estimate.lag": "--estimate latency",

@@ -38,6 +38,13 @@ def time_average(x: float) -> tuple[float, float]:
     return 2.0 * (x - 1.0 + math.exp(-x)) / x**2, (1.0 - math.exp(-x)) / x
 
 
+def about_average(before: float, after: float) -> float:
+    """Variance of a Gauss-Markov process's value about its mean over so many correlation times before it and after it."""
+    x = before + after
+    with_mean = (before * time_average(before)[1] + after * time_average(after)[1]) / x
+    return 1.0 + time_average(x)[0] - 2.0 * with_mean
+
+
 def taken_apart(
     model: InsModel, P: Array, bias: Array, whole: WholeBiases, known: Mapping[str, Array] = NONE_KNOWN
 ) -> tuple[Array, Array]:

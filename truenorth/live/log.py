@@ -22,6 +22,7 @@ Kind = Literal["rates", "increments"]
 MOST_ROWS = 125_000
 LONGEST_ROW = 0.101  # s
 FIRST_ROWS = 4096
+EARLIER = 10.0  # s of rows before the first one that is kept
 INTERVAL_ROWS = 200  # from which the nominal interval is taken
 
 
@@ -40,6 +41,8 @@ class Log:
     most : int
         Rows that are kept; at least 1000.
     """
+
+    earlier = np.empty((0, 7))  # rows before the first one that is kept: they say how a vehicle moved before a gap
 
     def __init__(self, kind: Kind = "rates", most: int = MOST_ROWS) -> None:
         self.source_kind: Kind = kind
@@ -75,6 +78,12 @@ class Log:
             return 0.0
         return self.merged / float(np.median(np.diff(self.rows[-500:, 0])))
 
+    def passed_over(self, rows: Array) -> None:
+        """Keep the newest of the rows that came before the first one to be kept."""
+        found = np.vstack([self.earlier, rows[np.isfinite(rows).all(axis=1)]])
+        found = found[np.unique(found[:, 0], return_index=True)[1]]
+        self.earlier = found[found[:, 0] > found[-1, 0] - EARLIER] if len(found) else found
+
     def add(self, block: Array) -> bool:
         """Take a block of ascending rows in; False where it lies before rows that are merged already, and was left out."""
         if self.merged > 1:
@@ -91,10 +100,13 @@ class Log:
                 self._drop(self._most // 4)
         return True
 
-    def record(self, since: float = -np.inf, until: float = np.inf) -> ImuRecord:
-        """Rows with ``since < time <= until`` as a record, copied."""
+    def record(self, since: float = -np.inf, until: float = np.inf, *, earlier: bool = False) -> ImuRecord:
+        """Rows with ``since < time <= until`` as a record, copied; `earlier`: and those of them that were passed over."""
         first, last = np.searchsorted(self.rows[:, 0], (since, until), side="right")
-        return record_of(self.rows[first:last].copy(), self.kind)
+        rows = self.rows[first:last].copy()
+        if earlier and self.merged == 1:
+            rows = np.vstack([self.earlier[self.earlier[:, 0] > since], rows])
+        return record_of(rows, self.kind)
 
     @property
     def last_gap(self) -> float:

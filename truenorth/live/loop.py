@@ -20,18 +20,20 @@ from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.bridges import Gap, bridged, unbroken
 from truenorth.live.feed import Feed
+from truenorth.live.intake import LATE
 from truenorth.live.lasting import AHEAD, NEWEST, Shown, lasting_errors, next_glance, next_look
 from truenorth.live.log import Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.siblings import Siblings
-from truenorth.navigation.first_row import carried_to
+from truenorth.navigation.first_row import carried_to, row_before_gap
 from truenorth.navigation.given import fed_back
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.start import force_at_rest
 from truenorth.quality.stamps import stamp_notes, stamp_scatter
 from truenorth.records import ImuRecord
+from truenorth.records.lost_rows import GAP_FACTOR, lack_rows
 from truenorth.records.specs import ImuSpec
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
@@ -174,9 +176,12 @@ class Loop:
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         if self._state is None and len(rows) < FIRST:
             return
-        self._waiting = [rows]
         if self._state is None:
+            if (found := self._from_start(rows, log)) is None:
+                return
+            rows = found
             self._begin(rows, feeds)
+        self._waiting = [rows]
         count = int(np.searchsorted(rows[:, 0], until, side="right"))
         late = int(np.searchsorted(rows[:, 0], self.end, side="right"))
         if count <= late:
@@ -197,9 +202,32 @@ class Loop:
         self.past.add(track)
         self.siblings.take(setting, samples, aiding, track)
 
+    def _from_start(self, rows: Array, log: Log) -> Array | None:
+        """The rows from the start's epoch on: where the first ones are lost, with one as the last before it, and the gap behind it.
+
+        None where late rows may still fill that gap, or where no row says how the vehicle moved before it.
+        """
+        self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
+        step, interval = rows[0, 0] - self.start.time, np.array([self._interval])
+        if (
+            step <= GAP_FACTOR * self._interval
+            or not lack_rows(rows[:, 0], np.zeros(1, int), np.array([step]), interval)[0]
+        ):
+            return rows
+        if log.end - LATE <= rows[0, 0]:
+            return None
+        if not len(log.earlier):
+            self.failure = (
+                f"the rows of the IMU begin {step:.3f} s after the start at {self.start.time:.3f} s: what the vehicle did "
+                "until then is not known; push the rows before it as well, or align again"
+            )
+            return None
+        first = row_before_gap(self.start, self._interval, log.earlier[-1, 1:])[None]
+        log.add(first)
+        return np.vstack([first, rows])
+
     def _begin(self, rows: Array, feeds: Mapping[str, Feed]) -> None:
         """Make the loop ready, when enough rows are there to know their interval."""
-        self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
         setting = self.setting(feeds)
         time = float(rows[0, 0]) - self._interval
         start = carried_to(

@@ -131,8 +131,11 @@ class Navigator:
             Shapes that do not fit.
         """
         rows = as_rows(time, gyro, accel)
-        rows = rows[~(rows[:, 0] - self.intake.felt.late <= self.start.time)]
+        passed = rows[:, 0] - self.intake.felt.late <= self.start.time
         with self._lock:
+            if passed.any() and not self._loop.begun:
+                self.log.passed_over(rows[passed] - self.intake.felt.late * np.eye(7)[0])
+            rows = rows[~passed]
             for block in self.intake.sift(rows):
                 if not self.log.add(block):
                     self.intake.counts.taken -= len(block)

@@ -133,13 +133,14 @@ class Onward:
         time, C_nb, phi = at.time, at.C_nb, at.phi_covariance
         if self.carry is not None:
             time, C_nb, phi = self.carry.now()
+        lost = "" if self.mover is None else self.mover.failure  # at its first row
         return Answer(
             time=time,
             C_nb=C_nb,
             sigma=euler_sigma(C_nb, phi),
             floor=floor,
-            status=at.status,
-            reasons=reasons(at),
+            status="lost" if lost else at.status,
+            reasons=(*reasons(at), lost) if lost else reasons(at),
             solution=at,
             counts=counts,
             left=self.left,

@@ -3,6 +3,9 @@
 A transfer holds at the last row of its master, which falls anywhere within a row of the IMU. That row was taken whole: by up to
 its length the turn was taken twice. Ships that roll by 5 deg, 50 rows a second, were so tilted by 2 arcmin, and their velocity
 4 to 10 sigmas off a quarter of a minute later. So the start is carried to the beginning of the row, by what the row says.
+
+Rows that are lost right after the epoch leave no row before the gap that the navigation takes. One is made, of the last row before
+the epoch, and the gap behind it is bridged and counted as any other.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import earth_rate_n, gravity_n, radii, transport_rate_n
 from truenorth.core.errors import DataError
 from truenorth.records import ImuRecord
+from truenorth.records.lost_rows import GAP_FACTOR
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -40,10 +44,20 @@ def from_start(record: ImuRecord, start: Start) -> tuple[ImuRecord, Start]:
             "s; expected a log that holds the alignment's epoch and goes on from it, on the same clock"
         )
     part = record[first:]
+    if first in record.gaps and record.time[first] - start.time > GAP_FACTOR * record.interval:
+        held = np.concatenate([record.gyro[first - 1], record.accel[first - 1]])
+        made = row_before_gap(start, record.interval, held)
+        rows = np.vstack([made, np.column_stack([part.time, part.gyro, part.accel])])
+        return replace(part, time=rows[:, 0], gyro=rows[:, 1:4], accel=rows[:, 4:]), start
     edge = float(part.time[0]) - part.interval
     holding = max(first - 1, 0) if edge > start.time else first  # the row that the epoch lies in
     row = np.concatenate([[edge], record.gyro[holding], record.accel[holding]])
     return part, carried_to(start, row, part.interval, increments=record.kind == "increments")
+
+
+def row_before_gap(start: Start, interval: float, held: Array) -> Array:
+    """(7,) the row that begins at a start's epoch: gyros and accelerometers (6,) as in the row before that."""
+    return np.concatenate([[start.time + interval], held])
 
 
 def carried_to(start: Start, row: Array, interval: float, *, increments: bool) -> Start:

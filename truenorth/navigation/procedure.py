@@ -64,6 +64,7 @@ from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.heights import level_evidence
 from truenorth.quality.held import as_sampled
 from truenorth.quality.innovations import innovation_evidence
+from truenorth.quality.mounting import mounting_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
@@ -220,6 +221,9 @@ def _by_specification(
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     begin = arm_as_begun(begin, getattr(given.get(Gnss.key), "mounting", None))
+    seated = [
+        SENSORS[key][0] for key, a in given.items() if key in SENSORS and (key == Gnss.key or a.mounting is not None)
+    ]
     taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
     modelled = partial(_model, begin, (*errors, *deflection.groups), scale_factors, height)
@@ -242,7 +246,7 @@ def _by_specification(
         filtered_by_possible_arm(plan, given, smooth) if check_clocks else (filtered(plan, given, smooth), None)
     )
     plan, used, track, wanders = done
-    evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said]
+    evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said, *mounting_evidence(track, seated)]
     least = None
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")

@@ -90,8 +90,9 @@ def start_from_alignment(alignment: Alignment) -> Start:
         if alignment.moving is None:
             return replace(start, within=True)
         return _with_sensors(start, alignment.moving.summary())
-    joint = alignment.handover
+    joint, averaged = alignment.handover, alignment.duration
     if joint is None:
+        averaged = 0.0  # its biases and their sigmas are those of the epoch
         joint = _by_static_limits(
             alignment.C_nb,
             alignment.phi_covariance,
@@ -109,7 +110,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
         alignment.position,
         alignment.imu,
         alignment.disturbance,
-        alignment.duration,
+        averaged,
     )
 
 
@@ -125,14 +126,14 @@ def _start(
     position: Position,
     spec: ImuSpec,
     disturbance: Array,
-    duration: float,
+    averaged: float,
 ) -> Start:
     motion = np.where(np.isfinite(disturbance), disturbance, 0.0)
     P = prior_covariance(dv=np.hypot(motion, LEAST_VELOCITY_SIGMA), dp=position.sigma)
     joined = [*range(STATES)[PHI], *range(STATES)[BG], *range(STATES)[BA]]
     P[np.ix_(joined, joined)] = joint.P
     slow = spec.bias_variance - spec.constant_variance
-    whole = WholeBiases(np.maximum(joint.prior - slow, 0.0), duration)
+    whole = WholeBiases(np.maximum(joint.prior - slow, 0.0), averaged)
     lat, lon, alt = position.lat, position.lon, position.alt
     return Start(
         time, joint.C_nb, np.zeros(3), lat, lon, alt, gyro_bias, joint.accel_bias, positive(P), whole, plumb=DEFLECTION
@@ -317,13 +318,13 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
             within = s["method"].startswith("transfer")
             start = replace(_with_sensors(moving_start(*begin), s), within=within)
         else:
-            gyro_bias = numbers.pop("gyro_bias")
+            gyro_bias, averaged = numbers.pop("gyro_bias"), 0.0
             if "handover" in n:
+                averaged = float(s["duration_s"])
                 joint = Handover(**{key: _finite(n["handover"][key]) for key in JOINT})
             else:
                 joint = _by_static_limits(**numbers, position=position, spec=spec)
-            time, duration = float(s["time_s"]), float(s["duration_s"])
-            start = _start(time, gyro_bias, joint, position, spec, disturbance, duration)
+            start = _start(float(s["time_s"]), gyro_bias, joint, position, spec, disturbance, averaged)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise DataError(
             f"{path}: {error!r} is missing or not as expected; write the alignment again with this version of Truenorth"

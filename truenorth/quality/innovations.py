@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 SCHULER = 5064.0  # s
 NO_ROTATION = "zero rotation"  # that the gyros show themselves
 REST = ("zero velocity", NO_ROTATION)
+BASELINE = "GNSS heading"  # of two antennas
 BODY = ("odometer", "velocity log", *REST)
 
 
@@ -129,7 +130,12 @@ def _suspects(source: Residuals, at_rest: bool) -> tuple[str, ...]:
 
 
 def _elsewhere(source: Residuals) -> tuple[str, str, float] | None:
-    """What places say, its remedy, and how far they lie from the track, m, where all do in one direction and by one distance."""
+    """What places say, its remedy, and how far they lie from the track, m, where all do in one direction and by one distance.
+
+    Of two antennas' headings, by how much they are turned from it, rad, where all are by one angle.
+    """
+    if source.name == BASELINE:
+        return _turned(source)
     first = source.innovation[: max(FEWEST // 3, len(source.time) // 4)]
     if source.unit != "m" or len(first) < 2:
         return None
@@ -140,6 +146,16 @@ def _elsewhere(source: Residuals) -> tuple[str, str, float] | None:
             if away > limit("one place") * float(np.linalg.norm(off.std(axis=0))):
                 return f"innovations.{key}", remedy, away
     return None
+
+
+def _turned(source: Residuals) -> tuple[str, str, float] | None:
+    off = source.innovation[:, 0]
+    off = off[np.isfinite(off)]
+    if len(off) < FEWEST // 3:
+        return None
+    mean = np.exp(-1j * off).mean()  # measured less predicted, on the circle
+    angle, scatter = float(np.angle(mean)), math.sqrt(max(-2.0 * math.log(max(abs(mean), 1e-9)), 0.0))
+    return ("innovations.turned", "baseline", angle) if abs(angle) > limit("one place") * scatter else None
 
 
 def _growth(source: Residuals, sigma: Effect, by_motion: bool) -> list[Evidence]:

@@ -130,6 +130,10 @@ SENTENCES = {
         "{name}: {rejected} of {count} measurements rejected: all of them lie about {distance:.3g} m above or below the height of "
         "the start"
     ),
+    "innovations.turned": (
+        "{name}: {rejected} of {count} measurements rejected: all of them point about {distance:deg|+.3g} deg from where the track "
+        "says that the baseline does, clockwise positive"
+    ),
     "innovations.outliers": "{name}: {rejected} of {count} measurements rejected as outliers",
     "innovations.size": "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted",
     "innovations.coloured": (
@@ -229,6 +233,13 @@ SENTENCES = {
     "transfer.relative": "sigma is against the master, whose own errors come on top: they were not given",
     "transfer.open": "left open by this motion: {states}",
     # ---- clocks, arms, scales and mountings left open
+    "mounting.missed": (
+        "{name}: the mounting comes out {miss:deg|.3g} deg from the assumed one, which was taken as known to {prior:deg|.3g} deg"
+    ),
+    "mounting.baseline": (
+        "{name}: the baseline of the two antennas comes out {miss:deg|.3g} deg from the assumed one, which was taken as known to "
+        "{prior:deg|.3g} deg"
+    ),
     "second_look.late": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s late",
     "second_look.early": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s early",
     "second_look.arm": (

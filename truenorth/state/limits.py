@@ -224,7 +224,7 @@ LIMITS: dict[str, Limit] = {
     "one place": Limit(
         4.0,
         "scatter of the places",
-        "of places that are all off to one side: their mean is four times what they scatter by",
+        "of places or headings that are all off to one side: their mean is four times what they scatter by",
     ),
     # ---- noise
     "one noise": Limit(

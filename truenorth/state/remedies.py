@@ -25,6 +25,7 @@ REMEDIES = {
     "sensor_axes": "check its axes and unit",
     "imu_axes": "check the IMU's axes",
     "mounting": "give the mounting",
+    "baseline": "say in which direction the second antenna lies from the first, and check the heading at the start",
     "estimate.lag": "let it be estimated",
     "estimate.scale": "let it be estimated",
     "estimate.mounting": "let it be estimated",
