@@ -8,6 +8,7 @@ import numpy as np
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import radii
 from truenorth.core.yaml_file import read_mapping
+from truenorth.damping.fix_rows import FixRows
 from truenorth.errors.marine import BA, BG, DP, DV, PHI, STATES
 from truenorth.simulation import simulate
 from truenorth.simulation.scenario import SHIPPED, read_scenario
@@ -64,3 +65,9 @@ def navigate(ideal, truth, x0, gyro_bias, accel_bias):
         v_n=joined(start.v_n, out.v_n),
         position=joined([start.lat, start.lon, start.alt], out.position),
     )
+
+
+def fix_rows(course, z, sigma):
+    """Fixes of a course from arrays (K+1, 3) with an epoch a row, NaN where there is none."""
+    k = np.flatnonzero(np.isfinite(z).any(axis=1))
+    return FixRows(k, course.time[k], z[k], sigma[k], np.zeros((len(k), 3)))

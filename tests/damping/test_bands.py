@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.damping.marine_case import ideal_and_truth
+from tests.damping.marine_case import fix_rows, ideal_and_truth
 from tests.damping.test_filters import SIGMA, WALKS, reference
 from truenorth.damping.bands import filter_bands, network_bands
 from truenorth.damping.filters import Filter, run_filters
-from truenorth.damping.fix_rows import FixRows
 from truenorth.damping.loop import Loop
 from truenorth.damping.networks import NO_NETWORK, second_order
 from truenorth.errors.log import LogErrors
@@ -88,7 +87,7 @@ def test_bands_of_a_filter_with_fixes_are_its_own(course, stands):
     z[[700, 905, 907], :2], size[[700, 905, 907], :2] = 0.0, np.array([50.0, 20.0, 30.0])[:, None]
     z[1203, 2], size[1203, 2] = 0.0, 1e-4
     absent = sparse(course) if stands else np.ones(len(course), dtype=bool)
-    kind = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05, fixes=FixRows(z, size))
+    kind = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05, fixes=fix_rows(course, z, size))
     _, own = alike(course, kind, absent)
     assert np.all(own[700, DP] < 0.7 * own[699, DP])
     assert np.all(own[910, DP] < 0.7 * own[900, DP])
@@ -100,7 +99,7 @@ def test_a_fix_is_as_good_as_its_sigma_by_every_reading_of_the_log(course, whole
     z, size = np.full((len(course), 3), np.nan), np.full((len(course), 3), 0.5)
     z[900, :2] = 0.0
     fast = MarineModel(**WALKS, groups=LogErrors(0.3, 600.0).groups())
-    kind = Filter(fast, fast.prior(np.diag(SIGMA**2)), 0.05, fixes=FixRows(z, size))
+    kind = Filter(fast, fast.prior(np.diag(SIGMA**2)), 0.05, fixes=fix_rows(course, z, size))
     bands = filter_bands(course, whole, kind, absent=sparse(course)).errors[:, DP]
     without = filter_bands(course, whole, replace(kind, fixes=None), absent=sparse(course)).errors[:, DP]
     np.testing.assert_allclose(bands[:890], without[:890], rtol=1e-12)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.damping.marine_case import HOUR, ideal_and_truth
+from tests.damping.marine_case import HOUR, fix_rows, ideal_and_truth
 from tests.damping.test_filters import SIGMA, WALKS, reference
 from tests.runs import few_and_all
 from truenorth.core.attitude import dcm_from_euler
@@ -15,7 +15,6 @@ from truenorth.damping.bands import filter_bands
 from truenorth.damping.course import linearised, without_errors
 from truenorth.damping.drift import likely_drifts
 from truenorth.damping.filters import Filter, Fusion, run_filters
-from truenorth.damping.fix_rows import FixRows
 from truenorth.damping.navigation import change_filter
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
 from truenorth.errors.marine import BA, BG, DP, PHI, MarineModel
@@ -124,7 +123,7 @@ def test_a_gate_goes_on_past_a_part_with_a_fix(truth):
     course = truth[: round(11.9 * HOUR / 10)]
     z, sigma = np.full((len(course.time), 3), np.nan), np.ones((len(course.time), 3))
     z[4000], sigma[4000] = [20.0, -10.0, 1e-4], [10.0, 10.0, 1e-4]
-    whole = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05, fixes=FixRows(z, sigma))
+    whole = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05, fixes=fix_rows(course, z, sigma))
     shown = reference(course, np.zeros(2))
     kinds = {"plain": whole, "gated": replace(whole, gate=1.0 - 1e-12)}
     plain, gated = run_filters(course, shown, start=0, kinds=kinds).values()
@@ -150,7 +149,7 @@ def test_two_fixes_calibrate_the_gyros(truth):
         z[k], sigma[k] = [*x[k, DP], x[k, PHI.stop - 1]], [1.0, 1.0, np.radians(0.1 / 60)]
     prior = SIGMA.copy()
     prior[BG] *= 20.0  # the fixes tell, not the prior
-    kind = Filter(model, np.diag(prior**2), 0.05, fixes=FixRows(z, sigma))
+    kind = Filter(model, np.diag(prior**2), 0.05, fixes=fix_rows(course, z, sigma))
     silent = np.full((len(truth.time), 2), np.nan)
     found = run_filters(course, silent, start=0, kinds={"free": kind})["free"]
 

@@ -42,11 +42,11 @@ METHODS = ("internal", "external", "kalman", "double", "augmented")
 
 
 class Ship:
-    """A voyage of 24 h with drawn errors: log, start, truth."""
+    """A voyage with drawn errors: log, start, truth."""
 
-    def __init__(self, lat=45.78, heading=51.34, seed=1):
+    def __init__(self, lat=45.78, heading=51.34, seed=1, hours=24.0):
         self.rng = np.random.default_rng(seed)
-        ideal, self.truth = ideal_and_truth(lat, heading, hours=24.0)
+        ideal, self.truth = ideal_and_truth(lat, heading, hours=hours)
         x0 = SIGMA * self.rng.standard_normal(13)
         biases = {"gyro_bias": x0[BG], "accel_bias": x0[BA]}
         self.record = simulate(ideal, imu=ImuSpec(**_walks()), seed=seed, errors=biases).record
@@ -61,12 +61,12 @@ class Ship:
         v[:, :2] += error + 0.05 * self.rng.standard_normal((len(v), 2))
         return VelocityRecord(self.truth.time, v, "navigation")
 
-    def navigate(self, damper, log=None, errors=STEADY):
-        aid = () if log is None else VelocityLog(log, errors=errors)
+    def navigate(self, damper, log=None, errors=STEADY, fixes=None):
+        aid = [] if log is None else [VelocityLog(log, errors=errors)]
         return navigate(
             self.record,
             self.start,
-            aid=aid,
+            aid=aid if fixes is None else [*aid, fixes],
             altitude="fixed",
             imu=SPEC,
             deflection=STRAIGHT,

@@ -27,6 +27,8 @@ from truenorth.aiding.heading import HEADING
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import UsageError
 
+PLACE, AZIMUTH = "position fix", "azimuth reset"  # sources of measurements
+
 
 @dataclass(frozen=True)
 class PositionFix:
@@ -100,10 +102,8 @@ class Fixes:
         if self.positions:
             time, lat, lon, sigma = np.array([(p.time, p.lat, p.lon, p.sigma) for p in self.positions]).T
             places = np.column_stack([lat, lon, np.full(len(lat), np.nan)])
-            found.append(Aiding("position fix", "position", time, places, np.column_stack([sigma] * 3), gate=0.0))
+            found.append(Aiding(PLACE, "position", time, places, np.column_stack([sigma] * 3), gate=0.0))
         if self.azimuths:
             time, heading, sigma = np.array([(a.time, a.heading, a.sigma) for a in self.azimuths]).T
-            found.append(
-                Aiding("azimuth reset", HEADING, time, heading[:, None], np.column_stack([sigma] * 3), gate=0.0)
-            )
+            found.append(Aiding(AZIMUTH, HEADING, time, heading[:, None], np.column_stack([sigma] * 3), gate=0.0))
         return found

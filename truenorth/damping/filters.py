@@ -26,10 +26,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import intervals, without_errors
-from truenorth.damping.fix_rows import FixRows
+from truenorth.damping.fix_rows import FixRows, Weighed
 from truenorth.errors.log import log_rows
 from truenorth.errors.marine import DV, MOTION, PHI, STATES, MarineModel
-from truenorth.filters import Estimates, FilterState, LinearSystem, gated, kalman
+from truenorth.filters import FilterState, LinearSystem, gated, kalman
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -59,6 +59,8 @@ class Estimate:
         Logarithm of that of all measurements.
     weight : (K+1-start, n) array or None
         Of filter 1, in a fusion.
+    fixes : Weighed or None
+        What it made of its fixes.
     """
 
     start: int
@@ -70,6 +72,7 @@ class Estimate:
     innovation_sigma: Array | None = field(default=None, repr=False)
     likelihood: float = 0.0
     weight: Array | None = field(default=None, repr=False)
+    fixes: Weighed | None = field(default=None, repr=False)
 
     @property
     def rejected(self) -> int:
@@ -100,7 +103,7 @@ class Filter:
     gate : float, optional
         Probability with which a good measurement passes a chi-square gate; no gate when left out.
     fixes : FixRows or None
-        Places and headings from outside.
+        Places and headings from outside; each has a gate of its own.
     turned : bool
         The log is in body axes, and the INS's own heading has turned it: its error shows as ``phi x v``.
     """
@@ -153,6 +156,7 @@ class _Stream:
         self.state: FilterState | None = None
         self.rows = np.zeros((0, 2, n))
         self.done = 1
+        self.fixes = None if kind.fixes is None else Weighed(kind.fixes)
 
     def feed(self, part: Track, z: Array, linear: Linear | None = None) -> None:
         """Take the next epochs: K intervals of the course, z (K, 2), and what it is linear in, where that is known."""
@@ -184,46 +188,33 @@ class _Stream:
             H = (total[len(self.rows) + 1 :] - total[np.maximum(first, 0)]) / self.lag
             z = np.where((first >= 0)[:, None], z, np.nan)
             self.rows = rows[-self.lag :]
-        z, H, R = self._with_fixes(part, z, H)
-        system = LinearSystem(
-            Phi=Phi[:, :n, :n],
-            Q=self.kind.model.noise_of(self.interval, 0.5 * (part.v_n[1:] + part.v_n[:-1])),
-            H=H,
-            R=R,
-            z=z,
-            x0=np.zeros(n),
-            P0=self.kind.P0,
-        )
-        place = slice(self.done, self.done + K)
-        if self.kind.gate is None:
+        Q = self.kind.model.noise_of(self.interval, 0.5 * (part.v_n[1:] + part.v_n[:-1]))
+        at = np.zeros(0, dtype=int) if self.kind.fixes is None else self.kind.fixes.epoch - self.done
+        ends = np.unique(np.append(at[(at >= 0) & (at < K)] + 1, K))  # behind each row that a fix comes with
+        for begin, end in zip(np.append(0, ends[:-1]), ends, strict=True):
+            some = slice(begin, end)
+            self._run(Phi[some, :n, :n], Q[some] if len(Q) > 1 else Q, H[some], z[some])
+
+    def _run(self, Phi: Array, Q: Array, H: Array, z: Array) -> None:
+        """Through rows of the log, and the fixes behind the last of them."""
+        kind, n, place = self.kind, self.kind.model.states, slice(self.done, self.done + len(z))
+        system = LinearSystem(Phi, Q, H, kind.sigma**2 * np.eye(2)[None], z, np.zeros(n), kind.P0)
+        if kind.gate is None:
             found = kalman(system, self.state, history="sigma")
-            self.used[place] = np.where(np.isnan(system.z[:, :2]), np.nan, 1.0)
+            self.used[place] = np.where(np.isnan(z), np.nan, 1.0)
         else:
-            found = gated(system, self.state, probability=self.kind.gate, history="sigma")
-            self.used[place] = found.adaptation[:, :2]
-        self.x[place], self.sigma[place] = found.x, found.sigma
-        self._innovate(place, found)
-        self.state, self.done = found.state, self.done + K
-
-    def _with_fixes(self, part: Track, z: Array, H: Array) -> tuple[Array, Array, Array]:
-        """Rows of place (east, north, m) and heading behind those of the velocity, where the course has fixes at all.
-
-        In a part without one they are absent: a gate remembers as many rows as it has, from part to part.
-        """
-        R = self.kind.sigma**2 * np.eye(2)[None]
-        fixes, own = self.kind.fixes, slice(self.done, self.done + len(z))
-        if fixes is None:
-            return z, H, R
-        rows = fixes.rows(self.kind.model.states)
-        R = np.zeros((len(z), 5, 5))
-        R[:, :2, :2] = self.kind.sigma**2 * np.eye(2)
-        R[:, range(2, 5), range(2, 5)] = fixes.sigma[own] ** 2
-        H = np.concatenate([H, np.broadcast_to(rows, (len(z), *rows.shape))], axis=1)
-        return np.concatenate([z, fixes.z[own]], axis=1), H, R
-
-    def _innovate(self, place: slice, found: Estimates) -> None:
-        variance, nu = np.diagonal(found.innovation_covariance, axis1=1, axis2=2)[:, :2], found.innovation[:, :2]
+            found = gated(system, self.state, probability=kind.gate, history="sigma")
+            self.used[place] = found.adaptation
+        variance, nu = np.diagonal(found.innovation_covariance, axis1=1, axis2=2), found.innovation
         self.innovation[place], self.innovation_sigma[place] = nu, np.where(np.isfinite(nu), np.sqrt(variance), np.nan)
+        self.x[place], self.sigma[place] = found.x, found.sigma
+        self.state, self.done = found.state, place.stop
+        if self.fixes is None:
+            return
+        for number in np.flatnonzero(self.fixes.fixes.epoch == place.stop - 1):
+            self.state = self.fixes.take(int(number), self.state)
+            self.x[place.stop - 1] = self.state.x
+            self.sigma[place.stop - 1] = np.sqrt(np.diagonal(self.state.P))
 
     def estimate(self, start: int) -> Estimate:
         assert self.state is not None  # there is one block at least
@@ -236,6 +227,7 @@ class _Stream:
             self.innovation,
             self.innovation_sigma,
             float(self.state.log_likelihood),
+            fixes=self.fixes,
         )
 
 

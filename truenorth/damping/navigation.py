@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.fixes import Fixes
-from truenorth.core import earth
 from truenorth.core.errors import DataError, UsageError
 from truenorth.damping.answer import (
     Found,
@@ -25,11 +24,11 @@ from truenorth.damping.answer import (
     spectrum_of,
     switched,
 )
-from truenorth.damping.bands import filter_bands, network_bands, widest
-from truenorth.damping.course import motion_at, place_at, without_errors
+from truenorth.damping.bands import Bands, filter_bands, network_bands, widest
+from truenorth.damping.course import without_errors
 from truenorth.damping.drift import likely_drifts
-from truenorth.damping.filters import Filter, Fusion, run_filters
-from truenorth.damping.fix_rows import FixRows
+from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
+from truenorth.damping.fix_rows import FixRows, fixes_on
 from truenorth.damping.log_arm import at_the_imu
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, first_order, second_order
@@ -128,10 +127,10 @@ def damp_navigation(
     finest = course if fine is None else even(fine)
     log = LogOn(None, LogErrors(0.0), False, None) if velocity is None else _log_on(course, velocity, finest, spec)
     drifts, evidence = _with_drift(course, log, spec, others, start)
-    fixed = _fixes_on(course, finest, fixes, start)
-    wholes = [replace(_whole(course, log, errors, spec, others, start), fixes=fixed) for errors in drifts]
+    fixed = fixes_on(course, finest, fixes, start)
+    wholes = [_whole(course, log, errors, spec, others, start) for errors in drifts]
     whole = wholes[0]
-    found = _damped(course, log.reference, spec, damper, start, wholes, drifts[0])
+    found = _damped(course, log.reference, spec, damper, start, wholes, drifts[0], fixed)
     damped = without_errors(course, found.x)
     seen = slice(start, None)
     base = 0.0 if log.reference is None else log.reference.velocity[seen]
@@ -162,14 +161,17 @@ def damp_navigation(
     evidence += [] if not report.rejected else [note("log.rejected", count=report.rejected)]
     if found.switching is not None and found.switching.switches:
         evidence.append(switched(found.switching, course.time))
+    of_fixes = [] if found.estimate is None or found.estimate.fixes is None else found.estimate.fixes.residuals()
     track = course
     if damper.method != "none":
         track = corrected(damped, found, start)
-        track = replace(track, residuals=tuple(residuals))
+        track = replace(track, residuals=(*residuals, *of_fixes))
+    sigma = last_sigma(track)
     if damper.method == "augmented":
-        evidence += innovation_evidence(residuals, last_sigma(track))
+        evidence += innovation_evidence(residuals, sigma)
     else:
-        evidence += residual_evidence(residuals, last_sigma(track), log.errors.time)
+        evidence += residual_evidence(residuals, sigma, log.errors.time)
+    evidence += innovation_evidence(of_fixes, sigma, given=True)
     return judged_navigation(replace(result, track=track, damping=report), evidence)
 
 
@@ -178,30 +180,6 @@ def _log_on(course: Track, velocity: VelocityLog, seen: Track, spec: ImuSpec) ->
     errors = log_errors(velocity.errors, record.frame)
     record, arm = at_the_imu(seen, record, velocity.mounting, errors, spec)
     return LogOn(reference_of(course, record, errors, seen), errors, record.frame == "body", arm)
-
-
-def _fixes_on(course: Track, seen: Track, fixes: Fixes, start: int) -> FixRows | None:
-    """Fixes as errors of the course at their own times, given to the nearest epochs after the switch."""
-    z, sigma = np.full((len(course), 3), np.nan), np.ones((len(course), 3))
-
-    def epoch(time: float) -> int:
-        k = round((time - course.time[0]) / course.interval)
-        if not start < k < len(course):
-            raise DataError(
-                f"a fix at {time:.1f} s; damping runs from {course.time[start]:.1f} s to {course.time[-1]:.1f} s"
-            )
-        return k
-
-    for fix in fixes.positions:
-        k, (lat, lon, alt) = epoch(fix.time), place_at(seen, fix.time)
-        R_M, R_N = earth.radii(lat)
-        apart = math.remainder(lon - fix.lon, 2.0 * math.pi)
-        z[k, :2], sigma[k, :2] = (apart * (R_N + alt) * math.cos(lat), (lat - fix.lat) * (R_M + alt)), fix.sigma
-    for turn in fixes.azimuths:
-        k, C_nb = epoch(turn.time), motion_at(seen, np.array([turn.time]))[0][0]
-        heading = math.atan2(C_nb[0, 1], C_nb[1, 1])
-        z[k, 2], sigma[k, 2] = math.remainder(heading - turn.heading, 2.0 * math.pi), turn.sigma
-    return FixRows(z[start:], sigma[start:]) if np.isfinite(z).any() else None
 
 
 def _with_drift(
@@ -283,6 +261,7 @@ def _damped(
     start: int,
     wholes: Sequence[Filter],
     errors: LogErrors,
+    fixes: FixRows | None,
 ) -> Found:
     whole = wholes[0]
     x = np.zeros((len(course), MOTION.stop))
@@ -293,19 +272,7 @@ def _damped(
         return _by_network(course, reference, damper, start, wholes)
     assert reference is not None  # checked before
     if damper.method == "augmented":
-        calm = over_waves(course, reference.velocity, reference.noise, start)
-        kinds = {"augmented": replace(whole, gate=1.0 - limit("log's gate"), sigma=calm.noise)}
-        run = partial(run_filters, course, calm.velocity, start=start, kinds=kinds, seen=calm.course)
-        again = run(about=run()["augmented"].x[:, MOTION])
-        estimate = again["augmented"]
-        x[start:] = estimate.x[:, MOTION]
-        if len(wholes) > 1:  # of a drift that may as well be slower than the filter takes it for
-            absent = np.asarray(np.isnan(calm.velocity[start:]).any(axis=1))
-            slower = widest([filter_bands(rest, each, kinds["augmented"], absent=absent) for each in wholes[1:]])
-            sigma = estimate.sigma.copy()
-            sigma[:, MOTION] = np.maximum(sigma[:, MOTION], slower.errors)
-            estimate = replace(estimate, sigma=sigma)
-        return Found(x, None, estimate, None)
+        return _augmented(course, reference, start, wholes, fixes)
     model = MarineModel.from_spec(spec)
     one = Filter(model, whole.P0[:STATES, :STATES], reference.noise, relinearise=True)
     two = None if damper.method == "kalman" else change_filter(one, errors, course.interval)
@@ -322,6 +289,54 @@ def _damped(
     absent = np.asarray(np.isnan(reference.velocity[start:]).any(axis=1))
     bands = widest([filter_bands(rest, whole, one, two, known, absent) for whole in wholes])
     return Found(x, bands, estimate, None)
+
+
+def _augmented(
+    course: Track, reference: Reference, start: int, wholes: Sequence[Filter], fixes: FixRows | None
+) -> Found:
+    """By the filter of all errors, in the faster reading of the drift; sigma holds the slower one too, where there are two."""
+    calm = over_waves(course, reference.velocity, reference.noise, start)
+    whole = replace(wholes[0], gate=1.0 - limit("log's gate"), sigma=calm.noise)
+
+    def run(fixed: FixRows | None) -> Estimate:
+        kinds = {"augmented": replace(whole, fixes=fixed)}
+        once = partial(run_filters, course, calm.velocity, start=start, kinds=kinds, seen=calm.course)
+        return once(about=once()["augmented"].x[:, MOTION])["augmented"]
+
+    x = np.zeros((len(course), MOTION.stop))
+    if len(wholes) > 1:  # of a drift that may as well be slower than the filter takes it for
+        absent = np.asarray(np.isnan(calm.velocity[start:]).any(axis=1))
+
+        def bands_of(fixed: FixRows | None) -> Bands:
+            one = replace(whole, fixes=fixed)
+            return widest([filter_bands(course[start:], each, one, absent=absent) for each in wholes[1:]])
+
+        estimate, slower = _with_fixes(fixes, run, bands_of)
+        sigma = estimate.sigma.copy()
+        sigma[:, MOTION] = np.maximum(sigma[:, MOTION], slower.errors)
+        estimate = replace(estimate, sigma=sigma)
+    else:
+        estimate = run(fixes)
+    x[start:] = estimate.x[:, MOTION]
+    return Found(x, None, estimate, None)
+
+
+def _with_fixes(
+    fixes: FixRows | None, run: Callable[[FixRows | None], Estimate], bands_of: Callable[[FixRows | None], Bands]
+) -> tuple[Estimate, Bands]:
+    """A filter that weighs its fixes by bands which follow those that it takes."""
+    bands = bands_of(fixes)
+    if fixes is None:
+        return run(None), bands
+    taken = np.ones(len(fixes.time), dtype=bool)
+    for _ in fixes.time:
+        estimate = run(fixes.expected(bands.errors))
+        assert estimate.fixes is not None  # it was given some
+        if np.array_equal(estimate.fixes.used, taken):
+            break
+        taken = estimate.fixes.used
+        bands = bands_of(fixes.some(taken))
+    return estimate, bands
 
 
 def change_filter(one: Filter, errors: LogErrors, interval: float) -> Filter:

@@ -37,7 +37,12 @@ def largest_nis(rows: int) -> float:
 
 
 def innovation_evidence(
-    sources: Iterable[Residuals], sigma: Effect, *, by_motion: bool = False, in_sigma: Container[str] = ()
+    sources: Iterable[Residuals],
+    sigma: Effect,
+    *,
+    by_motion: bool = False,
+    in_sigma: Container[str] = (),
+    given: bool = False,
 ) -> list[Evidence]:
     """What the innovations of each source say of the model.
 
@@ -49,6 +54,9 @@ def innovation_evidence(
         Whether heading comes from motion alone: velocities in body axes then have no part in it.
     in_sigma : container of str
         Sources whose slow errors are in sigma already: their colour is not counted again.
+    given : bool
+        The sources are a few measurements that somebody gives and means. One that is rejected is an outlier where a later one
+        agrees with the answer again; the last one contradicts the answer at the end.
     """
     sources = list(sources)
     found = [note("innovations.late", name=source.name, late=source.passed) for source in sources if source.passed]
@@ -57,7 +65,20 @@ def innovation_evidence(
     for source in sources:
         count = len(source.time)
         rejected = int(np.sum(~source.used))
-        if _mostly_rejected(source):
+        if given and (_mostly_rejected(source) or not source.used[-1]):
+            largest = math.sqrt(float(source.nis[~source.used].max()))
+            found.append(
+                contradiction(
+                    "innovations.given",
+                    "given",
+                    "specification",
+                    name=source.name,
+                    rejected=rejected,
+                    count=count,
+                    largest=largest,
+                )
+            )
+        elif _mostly_rejected(source):
             size = float(np.median(np.sqrt(np.nansum(source.innovation**2, axis=1))))
             where = _elsewhere(source)
             found.append(

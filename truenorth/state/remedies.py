@@ -16,6 +16,7 @@ REMEDIES = {
     "units": "check the units",
     "specification": "check the specification",
     "source": "check axes, units, clock, lever arm and sigmas of that sensor",
+    "given": "check their times, numbers and sigmas",
     "raw_rates": "log the rates of the sensor, not those that a filter has corrected, or align from a stop on",
     "common_clock": "check that both come from one clock and one filter",
     "grid_north": "check whether they count from grid north",
