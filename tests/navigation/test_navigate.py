@@ -168,6 +168,22 @@ def test_a_barometer_of_another_level_has_no_good_status(drive):
     assert wide.status == "navigated"
 
 
+@pytest.mark.parametrize("altitude", ["gnss", "free"])
+def test_height_holds_the_level_of_a_barometer_that_does_not_keep_it(drive, altitude):
+    """Heights of GNSS above the ellipsoid, 45 m below those above the sea: 60 sigmas off in silence."""
+    motion, record, start = drive
+    time = np.arange(0.2, 179.0)
+    high = Barometer(HeightRecord(time, motion.states(time).alt + 45.0))
+    gnss = Gnss(fixes(motion, time), Mounting())
+    asked = {"imu": SPEC, "altitude": altitude, "check_clocks": False}
+    alone, both = (navigate(record, start, aid=aid, **asked) for aid in (gnss, [gnss, high]))
+    assert both.status == "navigated"
+    assert any(e.key == "height.either" and e.urgent for e in both.evidence)
+    assert both.position_sigma[:, 2] == pytest.approx(np.hypot(45.0, alone.position_sigma[:, 2]), rel=0.02)
+    assert np.array_equal(both.position, alone.position)
+    assert np.array_equal(both.position_sigma[:, :2], alone.position_sigma[:, :2])
+
+
 def test_stops_are_found_where_the_car_stands_and_nowhere_else(drive):
     _, record, start = drive
     result = navigate(record, start, imu=SPEC, altitude="fixed", zupt="auto")

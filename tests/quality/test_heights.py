@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from truenorth.aiding.aids import Barometer, Gnss
-from truenorth.quality.heights import level_evidence
+from truenorth.quality.heights import either_level, level_evidence
 from truenorth.records import GnssRecord, HeightRecord
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Residuals, Track
+from truenorth.state.wording import sentences
 
 TIME = np.arange(200.0)
 KNOWN = Mounting()  # of which nothing is to be found
@@ -18,6 +19,14 @@ def track(*residuals):
     """Of which the residuals alone are looked at."""
     found = object.__new__(Track)
     object.__setattr__(found, "residuals", residuals)
+    return found
+
+
+def known_to(sigma):
+    """A track whose states are all known to this sigma."""
+    found = track()
+    for name, value in (("time", TIME), ("P", np.tile(sigma**2 * np.eye(15), (len(TIME), 1, 1)))):
+        object.__setattr__(found, name, value)
     return found
 
 
@@ -89,6 +98,24 @@ def test_first_rows_are_held_against_the_start():
     assert not level_evidence(baro, None, track(first_rows(np.where(TIME < 3.0, 150.0, 0.0))))
     assert not level_evidence(baro, None, track(first_rows(np.where(TIME > 40.0, 150.0, 0.0))))
     assert not level_evidence(baro, None, track())
+
+
+@pytest.mark.parametrize("undulation", [-106.0, -45.0, 30.0, 85.0])
+def test_a_height_kept_by_gnss_may_be_off_by_what_a_barometer_differs_by(undulation):
+    """Heights above the ellipsoid and above the sea: nobody knows which of the two the reader means, and sigma holds both."""
+    baro = Barometer(HeightRecord(TIME, 400.0 + RISE))
+    (found,), growth = either_level(baro, receiver(400.0 + RISE + undulation), known_to(0.7))
+    assert (found.key, found.remedies, found.kind, found.urgent) == ("height.either", ("level.either",), "note", True)
+    assert "geoid" in sentences([found])[0]
+    assert 0.7 * growth[:, 8] == pytest.approx(np.hypot(0.7, undulation))
+    assert (growth[:, :8] == 1.0).all()
+
+
+def test_a_barometer_that_chance_explains_widens_no_height():
+    baro = Barometer(HeightRecord(TIME, 424.0 + RISE))  # the weather: 2.4 sigmas
+    found, growth = either_level(baro, receiver(400.0 + RISE), known_to(0.7))
+    assert not found
+    assert (growth == 1.0).all()
 
 
 @pytest.mark.parametrize("seed", range(40))

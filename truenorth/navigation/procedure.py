@@ -61,7 +61,7 @@ from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_overlap, check_places
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
-from truenorth.quality.heights import level_evidence
+from truenorth.quality.heights import either_level, level_evidence
 from truenorth.quality.held import as_sampled
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.mounting import mounting_evidence
@@ -246,12 +246,18 @@ def _by_specification(
         filtered_by_possible_arm(plan, given, smooth) if check_clocks else (filtered(plan, given, smooth), None)
     )
     plan, used, track, wanders = done
+<<<<<<< HEAD
     evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said, *mounting_evidence(track, seated)]
     least = None
+=======
+    evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said]
+    levels, least = _other_level(plan, track, used)
+    evidence += levels
+>>>>>>> fixa
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
-        seen, least = _rivals(plan, track, used, noise, modelled, smooth, loose)
-        evidence += seen
+        seen, grows = _rivals(plan, track, used, noise, modelled, smooth, loose)
+        evidence, least = evidence + seen, np.maximum(least, grows)
     else:
         evidence += burst_evidence(record)
     force, acting = acting_at_rest(plan.start, noise)
@@ -316,6 +322,14 @@ def _seen(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec) -> 
         evidence += level_evidence(barometer, heights if isinstance(heights, Gnss) else None, track)
     unused = "baro" in given and plan.altitude != "baro"
     return [*evidence, *([note("height.barometer_unused", "use_barometer", altitude=plan.altitude)] if unused else [])]
+
+
+def _other_level(plan: Plan, track: Track, given: Mapping[str, Any]) -> tuple[list[Evidence], Array]:
+    """Whether a barometer that keeps no height has another level than the receiver, and by how much sigmas grow for it."""
+    barometer, receiver = given.get(Barometer.key), given.get(Gnss.key)
+    if plan.altitude == "baro" or not isinstance(barometer, Barometer) or not isinstance(receiver, Gnss):
+        return [], np.ones((len(track), 9))
+    return either_level(barometer, receiver, track)
 
 
 def _rivals(

@@ -7,10 +7,18 @@ well, no row is rejected at all. So the barometer's heights are held against tho
 ones against the start's: ``d = h_baro - h``, with the sigma of both. Where most rows are further off than the limit, nobody knows
 which of the two is right.
 
-Source: ICAO Doc 7488, *Manual of the ICAO Standard Atmosphere*, 3rd ed. (1993), for height by pressure.
+Where height is not kept by the barometer, the other sensor's level is in the answer, and that may be the wrong one as well: a
+receiver's heights above the ellipsoid and those above the sea are N apart, the undulation of the geoid, -106 to 85 m. The answer
+goes on, and its sigma of height counts the difference.
+
+Source: ICAO Doc 7488, *Manual of the ICAO Standard Atmosphere*, 3rd ed. (1993), for height by pressure; N. Pavlis et al., "The
+development and evaluation of the Earth Gravitational Model 2008", J. Geophys. Res. 117 (2012), for N.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +27,8 @@ from truenorth.aiding.aids import Barometer, Gnss
 from truenorth.aiding.sensors import BARO_SIGMA, height_sigma, place_axes
 from truenorth.core.units import FOOT
 from truenorth.quality.slow_aids import usual_bias
-from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.evidence import Evidence, contradiction, note
+from truenorth.state.layout import DP
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
 
@@ -47,18 +56,45 @@ def level_evidence(barometer: Barometer, receiver: Gnss | None, track: Track) ->
     list of Evidence
         None, or one: against the receiver's heights, else against the start's.
     """
-    record, mounting = barometer.record, barometer.mounting or barometer.usual
-    time = record.time - mounting.latency
-    if receiver is not None:
-        other, sigma = _heights_of(receiver, time)
-        noise = BARO_SIGMA if mounting.noise is None else mounting.noise
-        own = noise if record.sigma is None else np.where(np.isfinite(record.sigma), record.sigma, noise)
-        arms = float(np.linalg.norm(mounting.lever_arm))
-        found = _apart("height.apart", record.alt, other, np.sqrt(sigma**2 + own**2 + mounting.slow**2 + arms**2))
-        if found:
-            return found
+    if receiver is not None and (found := _apart("height.apart", *_of_both(barometer, receiver))):
+        return found
     rows = next((r for r in track.residuals if r.name == "barometer"), None)
-    return [] if rows is None else _at_first(rows, time, record.alt)
+    return [] if rows is None else _at_first(rows, _time_of(barometer), barometer.record.alt)
+
+
+def either_level(barometer: Barometer, receiver: Gnss, track: Track) -> tuple[list[Evidence], Array]:
+    """That a barometer by which height is not kept has another level than the receiver, and by how much sigmas grow for it.
+
+    No answer is refused for a sensor that it does not use. Nor is the level that it does use known to be right: by as much as both
+    are apart, where that is beyond chance, height may be off.
+
+    Returns
+    -------
+    evidence : list of Evidence
+    growth : (K, 9) array
+        Times one sigma of phi, dv and dp, along the way; ones but for height.
+    """
+    growth = np.ones((len(track), 9))
+    found = _apart("height.either", *_of_both(barometer, receiver), limit("doubt"), partial(note, urgent=True))
+    for item in found:
+        own = track.sigma[:, DP.stop - 1]
+        growth[:, DP.stop - 1] = np.hypot(1.0, float(item.figures["apart"]) / np.where(own > 0.0, own, np.inf))
+    return found, growth
+
+
+def _time_of(barometer: Barometer) -> Array:
+    """When its heights were, s."""
+    return barometer.record.time - (barometer.mounting or barometer.usual).latency
+
+
+def _of_both(barometer: Barometer, receiver: Gnss) -> tuple[Array, Array, Array]:
+    """A barometer's heights, those of a receiver at their times, and the sigma of both together."""
+    record, mounting = barometer.record, barometer.mounting or barometer.usual
+    other, sigma = _heights_of(receiver, _time_of(barometer))
+    noise = BARO_SIGMA if mounting.noise is None else mounting.noise
+    own = noise if record.sigma is None else np.where(np.isfinite(record.sigma), record.sigma, noise)
+    arms = float(np.linalg.norm(mounting.lever_arm))
+    return record.alt, other, np.sqrt(sigma**2 + own**2 + mounting.slow**2 + arms**2)
 
 
 def _heights_of(receiver: Gnss, time: Array) -> tuple[Array, Array]:
@@ -83,13 +119,19 @@ def _at_first(rows: Residuals, time: Array, alt: Array) -> list[Evidence]:
     return _apart("height.first", measured, measured + rows.innovation[first, 0], rows.sigma[first, 0])
 
 
-def _apart(key: str, measured: Array, other: Array, sigma: Array) -> list[Evidence]:
-    """Evidence that heights are further from others than both can be wrong; `sigma` of both together."""
+def _apart(
+    key: str,
+    measured: Array,
+    other: Array,
+    sigma: Array,
+    least: float = limit("heights"),
+    said: Callable[..., Evidence] = contradiction,
+) -> list[Evidence]:
+    """Evidence that heights are further from others than both can be wrong, by `least` times the `sigma` of both together."""
     off = measured - other
     there = np.isfinite(off)
-    if there.sum() < FEWEST or np.quantile(np.abs(off / sigma)[there], MOST) <= limit("heights"):
+    if there.sum() < FEWEST or np.quantile(np.abs(off / sigma)[there], MOST) <= least:
         return []
     in_feet = np.median(np.abs((FOOT * measured - other) / sigma)[there]) < limit("by chance")
     remedy = "height_in_feet" if in_feet else key.replace("height.", "level.")
-    apart, both = float(np.median(off[there])), float(np.median(sigma[there]))
-    return [contradiction(key, remedy, apart=apart, sigma=both)]
+    return [said(key, remedy, apart=float(np.median(off[there])), sigma=float(np.median(sigma[there])))]

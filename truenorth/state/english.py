@@ -287,6 +287,10 @@ SENTENCES = {
     "height.free": "height is carried on by velocity alone: no sensor of height is given",
     "height.fixed": "height is held fixed, as at sea",
     "height.apart": "the barometer's heights are {apart:+.0f} m off those of GNSS; one sigma of both together is {sigma:.3g} m",
+    "height.either": (
+        "the barometer's heights are {apart:+.0f} m off those of GNSS; one sigma of both together is {sigma:.3g} m; which of them "
+        "is off is not known, and sigma of height counts the difference"
+    ),
     "height.first": (
         "the barometer's first heights are {apart:+.0f} m off the height of the start; one sigma of both together is {sigma:.3g} m"
     ),

@@ -38,8 +38,13 @@ REMEDIES = {
     "arm.velocity": "check the arm; metres are expected",
     "height_sensor": "give a sensor of height, or let the height be free, where the vehicle climbs",
     "level.apart": (
-        "set the barometer's pressure at sea level, count both from one level (the sea's or the ellipsoid's), say how far the "
-        "barometer may be off (bias_sigma), or keep the height by GNSS"
+        "set the barometer's pressure at sea level, count both from one level (heights above the ellipsoid and above the sea "
+        "differ by up to 106 m, the geoid's undulation), say how far the barometer may be off (bias_sigma), or keep the height by "
+        "GNSS"
+    ),
+    "level.either": (
+        "count both from one level (heights above the ellipsoid and above the sea differ by up to 106 m, the geoid's undulation), "
+        "set the barometer's pressure at sea level, say how far the barometer may be off (bias_sigma), or leave it out"
     ),
     "level.first": (
         "set the barometer's pressure at sea level, say how far it may be off (bias_sigma), or correct the height of the start"
