@@ -246,18 +246,13 @@ def _by_specification(
         filtered_by_possible_arm(plan, given, smooth) if check_clocks else (filtered(plan, given, smooth), None)
     )
     plan, used, track, wanders = done
-<<<<<<< HEAD
     evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said, *mounting_evidence(track, seated)]
-    least = None
-=======
-    evidence = [*_seen(plan, track, used, noise), *taken, *wanders, *why, *said]
     levels, least = _other_level(plan, track, used)
     evidence += levels
->>>>>>> fixa
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
         seen, grows = _rivals(plan, track, used, noise, modelled, smooth, loose)
-        evidence, least = evidence + seen, np.maximum(least, grows)
+        evidence, least = evidence + seen, np.maximum(with_others(least, grows.shape[-1]), grows)
     else:
         evidence += burst_evidence(record)
     force, acting = acting_at_rest(plan.start, noise)

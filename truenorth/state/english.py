@@ -130,14 +130,12 @@ SENTENCES = {
         "{name}: {rejected} of {count} measurements rejected: all of them lie about {distance:.3g} m above or below the height of "
         "the start"
     ),
-<<<<<<< HEAD
     "innovations.turned": (
         "{name}: {rejected} of {count} measurements rejected: all of them point about {distance:deg|+.3g} deg from where the track "
         "says that the baseline does, clockwise positive"
-=======
+    ),
     "innovations.given": (
         "{name}: {rejected} of {count} measurements rejected: they contradict the track, by up to {largest:.3g} sigma of both"
->>>>>>> fixd
     ),
     "innovations.outliers": "{name}: {rejected} of {count} measurements rejected as outliers",
     "innovations.size": "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted",
