@@ -9,7 +9,7 @@ import pytest
 from benchmarks.honesty import moving
 from benchmarks.honesty.harness import Log, simulated
 from tests.alignment.test_in_motion_learnt import track_of
-from truenorth.alignment import in_motion
+from truenorth.alignment import in_motion, in_motion_constants
 from truenorth.alignment.in_motion_passes import fits_worse
 from truenorth.errors.group import Group
 from truenorth.quality.slow_aids import FIXES, LEAST, SPEEDS, Lasting
@@ -93,8 +93,8 @@ def test_slow_errors_of_a_receiver_hide_no_axes_nor_does_what_a_wheel_slips_alon
     task = SimpleNamespace(
         steady=False, lasting={name: Lasting(Group("slow", np.array(sizes)))}, with_constant_axes=lambda: constant
     )
-    monkeypatch.setattr(in_motion, "once_more", lambda task, before, first: found)
-    assert in_motion._as_specified(task, found, None)[0].steady is steady
+    monkeypatch.setattr(in_motion_constants, "once_more", lambda task, before, first: found)
+    assert in_motion_constants.as_specified(task, found, None)[0].steady is steady
 
 
 def test_the_log_decides():

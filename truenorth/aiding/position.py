@@ -166,8 +166,24 @@ def _converging(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H:
             H[j, own + j] = -measured[3 + j]
 
 
+@row
+def _of_known_motion(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    _shown(now, figures, at, assumed, measured, H, z)
+    lag = at[AT_LAG]
+    if lag >= 0:
+        tau = lag_now(now, assumed, lag)
+        back = tau / (1.0 + (tau / _SHORT) ** 4)
+        x, y = now[4] - back * now[NOW_PUSH], now[5] - back * now[NOW_PUSH + 1]
+        sine, cosine = azimuth(now)
+        H[0, lag] += measured[3] - cosine * x + sine * y
+        H[1, lag] += measured[4] - sine * x - cosine * y
+        H[2, lag] += measured[5] - now[6] + back * now[NOW_PUSH + 2]
+
+
 POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1}, swings=True, swings_late=True, unit="m")
 # As measured: latitude, longitude, height; how large the error is that a receiver has not lost yet, m, east, north, up.
 CONVERGING_POSITION = replace(
     POSITION, name="converging position", function=_converging, sizes={**POSITION.sizes, "own": 3}, width=6
 )
+# As measured: latitude, longitude, height; the velocity that is shown, m/s, east, north, up, of which the delay's column is.
+POSITION_OF_KNOWN_MOTION = replace(POSITION, name="position of a known motion", function=_of_known_motion, width=6)

@@ -19,12 +19,13 @@ from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_axes import half_turn_evidence
 from truenorth.alignment.in_motion_clocks import clock_evidence, on_another_clock
+from truenorth.alignment.in_motion_constants import as_specified
 from truenorth.alignment.in_motion_hidden import HIDDEN, hidden_from, of_level
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
-from truenorth.alignment.in_motion_moments import of_the_shake, two_moments, with_swing_apart
+from truenorth.alignment.in_motion_moments import of_the_shake, two_moments, with_smoothed_motion, with_swing_apart
 from truenorth.alignment.in_motion_open import open_track
-from truenorth.alignment.in_motion_passes import Pass, begun, fits_worse, once_more
+from truenorth.alignment.in_motion_passes import MORE_PASSES, Pass, begun, once_more
 from truenorth.alignment.in_motion_spread import Spread
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
@@ -52,7 +53,6 @@ from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.aid_noise import LOUD, noise_factors
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
-from truenorth.quality.slow_aids import FIXES, SPEEDS
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
@@ -69,7 +69,7 @@ HEADING_LIMIT = math.radians(5.0)
 GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros are asked for north first
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 # Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
-PASSES, MORE_PASSES = 2, 6
+PASSES = 2
 # One sigma of heading up to which axes of the gyros may be constants for the filter, a quarter of the bank's step: with no noise in
 # turns the products of a larger error with tilts, biases and axes pass for knowledge, and level was up to seven sigmas off.
 SURE = math.radians(7.5)
@@ -217,7 +217,9 @@ def _aligned(
         found = once_more(task, found, first)
     if passes > 1 and spread.and_more(found.sigma, found.used_twice, found.unsettled).heading < SURE:
         tell(f"pass {(number := number + 1)}")
-        task, found = _as_specified(task, found, first)
+        task, found = as_specified(task, found, first)
+    if passes > 1:
+        task, found = with_smoothed_motion(task, found, first, tell)
     if number > 1:
         spread = spread.and_more(found.used_twice, found.unsettled)
     guess, track, last = found.guess, found.track, None
@@ -257,31 +259,6 @@ def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[
     guesses = guesses_all_round(task.record, task.odometer, task.gnss, task.wheel, task.antenna)
     best, track, spread = _best_of_bank(task, guesses, tell)
     return begun(task, guesses[best], track), spread
-
-
-def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:
-    """Passes with axes of the gyros that are constants, where the log does not speak against them: task, the last pass.
-
-    Noise in turns besides states of the axes is the same error twice. It carries the first passes, of which nobody knows yet
-    whether the axes are constants; heading of a vehicle that turns all the time had three times its sigma by it. A log whose wheel
-    or velocity log has shown slow errors across its way that nobody spoke of is not as specified: these turn with the vehicle, and
-    hide what the axes do, as a wrong heading turns velocity across. Those of a receiver do not turn with it.
-    """
-    constant = task.with_constant_axes()
-    hidden = any(slow.across for name, slow in task.lasting.items() if name not in (FIXES, SPEEDS))
-    if constant is task or hidden:
-        return task, found
-    other = found
-    for number in range(MORE_PASSES):
-        if number > 0 and other.settled:
-            break
-        try:
-            other = once_more(constant, other, first)
-        except DataError:  # the filter broke down: they are not
-            return task, found
-        if fits_worse(found.track, other.track):
-            return task, found
-    return constant, other
 
 
 def _seen(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more
 from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
-from truenorth.alignment.in_motion_task import MovingTask
-from truenorth.core.errors import DataError
+from truenorth.alignment.in_motion_task import INTERVAL, MovingTask
+from truenorth.core.errors import DataError, UsageError
+from truenorth.estimate.known_motion import is_led_by_errors
 from truenorth.estimate.moment import likeliest_moment, quickness, tells_until
 from truenorth.estimate.moments import explained_by_two, velocities_apart
 from truenorth.state.evidence import Evidence
@@ -29,6 +31,20 @@ def two_moments(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask
             return task, found
         return _settled(apart.learnt(track)[0], found, first)
     except DataError:  # the filter broke down: they are of one moment
+        return task, found
+
+
+def with_smoothed_motion(
+    task: MovingTask, found: Pass, first: Guess, tell: Callable[[str], None]
+) -> tuple[MovingTask, Pass]:
+    """Task and last pass whose places are late by smoothed velocities, where errors of those of the pass matter; else the same."""
+    if not is_led_by_errors(found.track, task.aiding(gated=True), INTERVAL):
+        return task, found
+    tell("smoothing")
+    try:
+        known = replace(task, moves=task.run(found.guess, gated=True, smooth=True))
+        return known, once_more(known, found, first)
+    except (DataError, UsageError):  # the filter broke down, or has states that are not smoothed
         return task, found
 
 

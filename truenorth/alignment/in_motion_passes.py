@@ -18,6 +18,7 @@ from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
+MORE_PASSES = 6  # at the most, where what was learnt of the sensors still changes, or heading
 SETTLED = 0.3  # of its sigma, that heading may still move
 # A pass that follows the heading that it begins with by more than this has too narrow a guess: the next has twice its sigma.
 # Steps are up to ten times what a pass moves.

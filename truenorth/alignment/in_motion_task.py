@@ -24,6 +24,7 @@ from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.known_motion import of_known_motion
 from truenorth.estimate.latency import mounting_found
 from truenorth.estimate.memory import AS_IT_IS, OVER_GROUND
 from truenorth.estimate.moment import as_unsure
@@ -107,6 +108,7 @@ class MovingTask:
     swing_apart: bool = False  # an arm that is estimated is not learnt from swings, of which velocities may show a part
     shaken: bool = False  # the antenna shakes more quickly than its delay was known
     delay_spread: float = 0.0  # s, one sigma of what else that delay may be
+    moves: Track | None = None  # smoothed: by its velocities places are late
     sprung: bool = False  # the body goes up and down on its wheels: they do not say that it stays on the road
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
@@ -185,6 +187,7 @@ class MovingTask:
             found += self._of_swing(shown)
         found += [source if gated else replace(source, gate=0.0) for source in self.more]
         found = with_scatter(louder(with_slow(found, self.lasting), self.factors), self.scattered)
+        found = of_known_motion(found, self.moves)
         return on_springs(found) if self.sprung else found
 
     def _of_swing(self, shown: list[Aiding]) -> list[Aiding]:
@@ -194,8 +197,8 @@ class MovingTask:
         askew = float(axis_sigma(self.spec)[0].max())
         return with_unseen_arm(shown, self.record, askew, shaken=self.shaken)
 
-    def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
-        """One pass from a guess of the attitude at the start."""
+    def run(self, guess: Guess, *, gated: bool, until: float | None = None, smooth: bool = False) -> Track:
+        """One pass from a guess of the attitude at the start; smoothed with a row at each interval."""
         record = self.record if until is None else self.record.between(self.record.time[0], until)
         used = of_the_path(self.aiding(gated=gated), record)
         start = start_at(self.record, guess, self.begin, self.spec, self.odometer, self.gnss, self.wheel, self.antenna)
@@ -210,7 +213,8 @@ class MovingTask:
             with_states(self.model, used),
             used,
             interval=INTERVAL,
-            every=max(1, round(OUTPUT / INTERVAL)),
+            every=1 if smooth else max(1, round(OUTPUT / INTERVAL)),
+            smooth=smooth,
             invariant=AS_IT_IS if self.odometer is None else OVER_GROUND,
         )
 

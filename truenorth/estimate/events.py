@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.position import POSITION_OF_KNOWN_MOTION
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import UsageError
 from truenorth.errors.model import InsModel
@@ -153,21 +154,29 @@ def _reached(state: LoopState) -> float:
 
 
 def lag_of_fixes(setting: Setting) -> int:
-    """The state that is the delay of places over the ground; -1: there is none, or a sensor shows velocity.
+    """The state that is the delay of places over the ground; -1: there is none, its column is given, or a sensor shows velocity.
 
     That knows the column of the delay by more than the places that it stands in. That nothing moves shows none.
     """
-    if any(_shows_velocity(source) for source in setting.sources):
+    source = late_fixes(setting.sources)
+    if source is None or source.row is POSITION_OF_KNOWN_MOTION:
         return -1
-    for source in setting.sources:
+    return setting.model.layout.first_of(source.states["lag"].name)
+
+
+def late_fixes(sources: Sequence[Aiding]) -> Aiding | None:
+    """Places over the ground whose delay is estimated by them alone; None: there are none, or a sensor shows velocity."""
+    if any(_shows_velocity(source) for source in sources):
+        return None
+    for source in sources:
         if (
             source.row.over_ground
             and source.row.unit == "m"
             and source.does == "measurement"
             and "lag" in source.states
         ):
-            return setting.model.layout.first_of(source.states["lag"].name)
-    return -1
+            return source
+    return None
 
 
 def _shows_velocity(source: Aiding) -> bool:
