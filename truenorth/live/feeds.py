@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
-from truenorth.core.position import Position
+from truenorth.core.position import Position, eastward
 from truenorth.live.feed import Feed, or_none, table
 from truenorth.records import GnssRecord, HeightRecord, OdometerRecord, VelocityRecord
 from truenorth.state.mounting import Mounting
@@ -100,13 +101,18 @@ class GnssFeed(Feed):
         fixes = self.rows[np.isfinite(self.rows[:, 1:3]).all(axis=1), 1:4]
         if not len(fixes):
             return None
+        first = float(fixes[0, 1])
+        fixes[:, 1] = eastward(fixes[:, 1], first)  # fixes of one place lie on both sides of the date line
         lat, lon, alt = np.median(np.nan_to_num(fixes), axis=0)
-        return Position(float(lat), float(lon), float(alt), 10.0, 20.0)
+        return Position(float(lat), math.remainder(first + float(lon), 2.0 * math.pi), float(alt), 10.0, 20.0)
 
     @staticmethod
     def _metres(rows: Array) -> Array:
+        """(K, 2) north and east of the first fix."""
+        known = rows[np.isfinite(rows[:, 1:3]).all(axis=1)]
+        first = float(known[0, 2]) if len(known) else 0.0
         scale = 6.371e6  # metres to a radian, about: moved or not
-        return np.column_stack([rows[:, 1] * scale, rows[:, 2] * scale * np.cos(rows[:, 1])])
+        return np.column_stack([rows[:, 1] * scale, eastward(rows[:, 2], first) * scale * np.cos(rows[:, 1])])
 
     def fresh(self, rows: Array) -> Array:
         """See :class:`Feed`: fixes with place and velocity of the row before, to the last digit, as noise never has them.
