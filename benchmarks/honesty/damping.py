@@ -78,8 +78,9 @@ CASES = (
         for method in ("external", "kalman", "double")
         for name, true in (("constant error .3 m/s", CONSTANT), ("current .5 m/s, 3 h", current(3.0)))
     ),
-    Case(
-        "damping augmented", "fixes at 10 and 20 h; current .5 m/s, 3 h", damped("augmented", current(3.0), fixed=True)
+    *(
+        Case(f"damping {method}", "fixes at 10 and 20 h; current .5 m/s, 3 h", damped(method, current(3.0), fixed=True))
+        for method in ("augmented", "kalman", "double", "external", "internal")
     ),
     Case("damping double", "IMU five times worse", damped("double", CONSTANT, CONSTANT, spec=scaled(5.0))),
     Case("damping double", "IMU five times better", damped("double", CONSTANT, CONSTANT, spec=scaled(0.2))),

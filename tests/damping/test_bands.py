@@ -9,10 +9,11 @@ from tests.damping.marine_case import fix_rows, ideal_and_truth
 from tests.damping.test_filters import SIGMA, WALKS, reference
 from truenorth.damping.bands import filter_bands, network_bands
 from truenorth.damping.filters import Filter, run_filters
-from truenorth.damping.loop import Loop
+from truenorth.damping.fix_rows import Weighed
+from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import NO_NETWORK, second_order
 from truenorth.errors.log import LogErrors
-from truenorth.errors.marine import DP, PHI, MarineModel
+from truenorth.errors.marine import DP, DV, PHI, MarineModel
 
 STEP = 10  # epochs between the covariances of a course of 1 Hz
 FIRST = 3  # epoch of the log's first row: no covariance stands there
@@ -107,3 +108,23 @@ def test_a_fix_is_as_good_as_its_sigma_by_every_reading_of_the_log(course, whole
     np.testing.assert_allclose(bands[900], 0.5, rtol=0.02)
     assert np.all(bands[891:900] >= bands[890])
     assert np.all(bands[901:] < without[901:])
+
+
+def test_place_and_heading_of_a_network_begin_anew_with_a_fix(course, whole):
+    """At its own epoch, within a step of the covariances: nothing before it is touched, what it shows is as good as the fix."""
+    z, size = np.full((len(course), 3), np.nan), np.ones((len(course), 3))
+    z[903, :2], size[903, :2] = [80.0, -60.0], 50.0
+    z[905, 2], size[905, 2] = 5e-4, 1e-4
+    fixes = replace(fix_rows(course, z, size), anew=True)
+    mu, loop, options = np.ones(len(course)), Loop(second_order(0.5)), {"start": float(course.time[0])}
+    bands, alone = (network_bands(course, loop, whole, mu, log=True, fixes=each).errors for each in (fixes, None))
+    np.testing.assert_array_equal(bands[:901], alone[:901])
+    np.testing.assert_allclose(bands[910, DP], 50.0, rtol=1e-9)
+    np.testing.assert_allclose(bands[910, PHI][2], 1e-4, rtol=1e-9)
+    np.testing.assert_array_equal(bands[910, DV], alone[910, DV])
+    weighed, shown = Weighed(fixes.expected(bands)), reference(course, 0.0)
+    x, free = (network_correction(course, loop, shown, fixes=each, **options) for each in (weighed, None))
+    np.testing.assert_allclose(x[:903], free[:903], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(x[903, DP], [80.0, -60.0], atol=0.05)
+    np.testing.assert_allclose(x[905, PHI][2], 5e-4, atol=1e-8)
+    assert weighed.used.all()

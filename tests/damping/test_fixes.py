@@ -8,12 +8,14 @@ import pytest
 from tests.damping.test_navigation import Ship
 from truenorth.aiding.fixes import AzimuthFix, Fixes, PositionFix
 from truenorth.core.earth import radii
+from truenorth.core.errors import UsageError
 from truenorth.damping.fix_rows import Weighed, fixes_on
 from truenorth.damping.options import Damper
 from truenorth.errors.marine import DP
 from truenorth.filters import FilterState
 
 AUGMENTED = Damper("augmented")
+METHODS = ("augmented", "kalman", "double", "external", "internal")
 DEG = math.radians(1.0)
 FIRST, LAST = 3600.0, 9000.0  # s
 STEP = 600.0  # s, between fixes that are many
@@ -31,7 +33,7 @@ def log(ship):
 
 @pytest.fixture(scope="module")
 def without(ship, log):
-    return ship.navigate(AUGMENTED, log)
+    return {method: ship.navigate(Damper(method), log) for method in METHODS}
 
 
 def places(ship, times, north=0.0, sigma=100.0):
@@ -49,26 +51,30 @@ def azimuth(ship, time, wrong=0.0):
     return AzimuthFix(time, math.atan2(C[0, 1], C[1, 1]) + wrong, 0.05 * DEG)
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("what", ["place", "azimuth"])
-def test_what_contradicts_the_track_is_no_quiet_result(ship, log, without, what):
+def test_what_contradicts_the_track_is_no_quiet_result(ship, log, without, what, method):
     """A place 55 km to the north of where the ship is, an azimuth a degree off: they were left out, half of them or whole."""
     if what == "place":
         wrong, name = Fixes(places(ship, [FIRST], 55e3)), "position fix"
     else:
         wrong, name = Fixes((), [azimuth(ship, FIRST, 1.0 * DEG)]), "azimuth reset"
-    result = ship.navigate(AUGMENTED, log, fixes=wrong)
+    result, alone = ship.navigate(Damper(method), log, fixes=wrong), without[method]
     assert result.status == "inconsistent"
     assert f"{name}: 1 of 1 measurements rejected: they contradict the track" in result.reasons[0]
     said = result.summary()["aiding"]
     assert said[name] == {"measurements": 1, "rejected": 1, "outside": 0, "nis_over_rows": None}
     assert set(result.innovations()["sensor"]) == {"levelled velocity log", name}
-    np.testing.assert_allclose(result.position, without.position, rtol=0.0, atol=1e-12)  # neither axis of it is taken
-    np.testing.assert_allclose(result.track.sigma, without.track.sigma, rtol=1e-9)
+    np.testing.assert_allclose(result.position, alone.position, rtol=0.0, atol=1e-12)  # neither axis of it is taken
+    np.testing.assert_allclose(result.track.sigma, alone.track.sigma, rtol=1e-9)
 
 
-def test_what_is_right_is_taken_and_counted(ship, log, without):
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_right_is_taken_and_counted(ship, log, without, method):
     """Two places and an azimuth, two of them at one time: sigma comes down to theirs, errors with it."""
-    result = ship.navigate(AUGMENTED, log, fixes=Fixes(places(ship, [FIRST, LAST], sigma=10.0), [azimuth(ship, LAST)]))
+    result = ship.navigate(
+        Damper(method), log, fixes=Fixes(places(ship, [FIRST, LAST], sigma=10.0), [azimuth(ship, LAST)])
+    )
     assert result.status == "navigated"
     said = result.summary()["aiding"]
     assert [(said[name]["measurements"], said[name]["rejected"]) for name in ("position fix", "azimuth reset")] == [
@@ -78,7 +84,7 @@ def test_what_is_right_is_taken_and_counted(ship, log, without):
     k = int(np.searchsorted(result.time, LAST))
     assert np.all(result.position_sigma[k, :2] < 12.0)
     assert np.all(np.abs(ship.errors(result)[k, DP]) < 40.0)
-    assert np.all(without.position_sigma[k, :2] > 50.0)
+    assert np.all(without[method].position_sigma[k, :2] > 50.0)
 
 
 def test_two_places_at_one_time_are_two(ship, log):
@@ -116,3 +122,8 @@ def test_a_fix_is_weighed_by_the_wider_of_filter_and_bands(ship):
     assert wider.nis[0] == pytest.approx(5.76, rel=0.01)
     np.testing.assert_allclose(taken.x[DP], [0.0, -6000.0], atol=80.0)
     assert taken.memory is state.memory
+
+
+def test_an_undamped_navigation_with_fixes_needs_no_damping(ship):
+    with pytest.raises(UsageError, match="fixes with damping none"):
+        ship.navigate(Damper("none"), fixes=Fixes(places(ship, [FIRST])))

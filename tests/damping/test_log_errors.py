@@ -15,7 +15,7 @@ from truenorth.damping.bands import filter_bands
 from truenorth.damping.course import linearised, without_errors
 from truenorth.damping.drift import likely_drifts
 from truenorth.damping.filters import Filter, Fusion, run_filters
-from truenorth.damping.navigation import change_filter
+from truenorth.damping.methods import change_filter
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
 from truenorth.errors.marine import BA, BG, DP, PHI, MarineModel
 from truenorth.simulation.processes import gauss_markov

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.damping.bands import Bands
 from truenorth.damping.filters import Estimate
+from truenorth.damping.fix_rows import Weighed
 from truenorth.damping.log_arm import Arm
 from truenorth.damping.reference import Reference
 from truenorth.damping.result import LogHistory
@@ -41,12 +42,13 @@ class LogOn(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Errors (K+1, 7), their bands from the switch on, the filter's estimate where it is one, switches where there are some."""
+    """Errors (K+1, 7), their bands from the switch on, the filter's estimate where it is one, switches, fixes."""
 
     x: Array
     bands: Bands | None
     estimate: Estimate | None
     switching: Switching | None
+    fixes: Weighed | None = None
 
 
 def switched(found: Switching, time: Array) -> Evidence:

@@ -10,7 +10,8 @@ change of what filter 1 smooths over a step for filter 2,
 and the bands are those of ``x1 - e``. The fusion's error is ``x2 - e + w (x1 - x2)``, in which the difference of the filters is
 known: where filter 1 is far off, they differ and its weight is small. Its bands are of the error given that difference.
 
-A fix from outside is a row of filter 1 as the log's are: ``H`` shows place and heading of ``e``, ``n`` is the fix's own error.
+A fix from outside is a row of filter 1 as the log's are: ``H`` shows place and heading of ``e``, ``n`` is the fix's own error. Of a
+network, and of a filter that begins anew with it, ``n`` is what place or heading are then off by.
 
 Source: R. Brown, P. Hwang, *Introduction to Random Signals and Applied Kalman Filtering*, 4th ed. (2012), sec. 5.7 (suboptimal
 filters); J. Farrell, M. Barth, *The Global Positioning System and Inertial Navigation* (1999), sec. 4.10 (covariance analysis).
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 from truenorth.damping.course import linearised
 from truenorth.damping.filters import SETTLING, Filter, silences
+from truenorth.damping.fix_rows import ROWS, FixRows
 from truenorth.damping.loop import LONGEST_STEP, Loop, transition_and_input
 from truenorth.errors.marine import DV, MOTION
 from truenorth.filters.gains import Gains, filter_gains
@@ -51,7 +53,14 @@ def widest(bands: Sequence[Bands]) -> Bands:
 
 
 def network_bands(
-    course: Track, loop: Loop, whole: Filter, mu: Array, *, log: bool, absent: NDArray[np.bool_] | None = None
+    course: Track,
+    loop: Loop,
+    whole: Filter,
+    mu: Array,
+    *,
+    log: bool,
+    absent: NDArray[np.bool_] | None = None,
+    fixes: FixRows | None = None,
 ) -> Bands:
     """Of an INS with this loop: errors, network states, biases and errors of the log together.
 
@@ -67,6 +76,8 @@ def network_bands(
         It is fed with the log; else damping is internal.
     absent : (K+1,) array of bool, optional
         Epochs at which the log says nothing: in steps without a row the INS goes on undamped.
+    fixes : FixRows, optional
+        With which place and heading begin anew.
     """
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
     coarse = course[::stride]
@@ -96,10 +107,19 @@ def network_bands(
     white = whole.sigma**2 / np.maximum(rows, 1.0) * log
     Q = white[:, None, None] * (Gamma @ np.swapaxes(Gamma, -1, -2))
     Q[:, placed[:, None], placed] += model.noise_of(coarse.interval, 0.5 * (coarse.v_n[1:] + coarse.v_n[:-1]))
+    fixed = np.zeros(len(rows), dtype=bool)
+    if fixes is not None:
+        fix_sigma = fixes.sigma_of_steps(stride, len(rows))
+        fixed |= np.isfinite(fix_sigma).any(axis=1)
+        # The fix's own error is all that is left.
+        for k, shown in zip(*np.nonzero(np.isfinite(fix_sigma)), strict=True):
+            state = ROWS[shown]
+            Phi[k, state] = Q[k, state] = Q[k, :, state] = 0.0
+            Q[k, state, state] = fix_sigma[k, shown] ** 2
     joint = _covariances(Phi, Q, P)
     errors = np.diagonal(joint, axis1=1, axis2=2)[:, MOTION]
     residual = _variances(H[np.maximum(np.arange(len(joint)) - 1, 0)], joint)
-    return _spread(course, coarse, errors, residual + whole.sigma**2, rows)
+    return _spread(course, coarse, errors, residual + whole.sigma**2, np.where(fixed, 0.0, rows))
 
 
 def filter_bands(
@@ -119,7 +139,7 @@ def filter_bands(
     whole : Filter
         All errors of INS and log, as in :func:`network_bands`.
     one, two : Filter
-        As they run, filter 1 with its fixes.
+        As they run; filter 2 takes the fixes of filter 1.
     fused : (weight, difference), optional
         Of filters 1 and 2: (K+1, 7) the weight of filter 1, and by how much its estimate differs from filter 2's.
     absent : (K+1,) array of bool, optional
@@ -158,6 +178,8 @@ def filter_bands(
         Q, H = np.broadcast_to(whole.model.noise_of(part.interval, mean), Phi.shape), _with_fixes(whole, one, part)
         F1, Phi1 = linearised(part, one.model)
         Q1, H1 = one.model.noise_of(part.interval, mean)[:1], _with_fixes(one, one, part)
+        if one.fixes is not None:
+            Q1 = Q1 + one.fixes.unknown(seen1[steps, 2:], m)
         first, P1 = _gains(Phi1, Q1, H1, R1[steps], ~seen1[steps], P1)
         A, G = np.zeros((len(part) - 1, count, count)), np.zeros((len(part) - 1, count, H.shape[1]))
         B = np.zeros((len(part) - 1, count, n))  # of the noise that drives the errors
@@ -165,14 +187,18 @@ def filter_bands(
         A[:, x1, e], A[:, x1, x1] = first.gain @ H @ Phi, first.step
         B[:, x1], G[:, x1] = first.gain @ H, first.gain
         if two is not None and P2 is not None:
-            R2 = two.sigma**2 / (stride if two.overlap else 1) * np.eye(2)[None]
-            second, P2 = _gains(
-                Phi1, Q1, F1[:, DV, : two.model.states], R2, np.repeat(silent[rows, None], 2, axis=1), P2
-            )
-            K2 = second.gain / part.interval
+            white = np.full((len(part) - 1, 2), two.sigma**2 / (stride if two.overlap else 1))
+            R2 = np.concatenate([white, np.diagonal(R1[steps], axis1=1, axis2=2)[:, 2:]], axis=1)
+            absent2 = np.concatenate([np.repeat(silent[rows, None], 2, axis=1), ~seen1[steps, 2:]], axis=1)
+            H2 = np.concatenate([F1[:, DV, :m], H1[:, 2:]], axis=1)
+            second, P2 = _gains(Phi1, Q1, H2, R2[:, :, None] * np.eye(H2.shape[1]), absent2, P2)
+            K2, of_fixes = second.gain[:, :, :2] / part.interval, second.gain[:, :, 2:]
             A[:, x2], B[:, x2], G[:, x2] = K2 @ A[:, v1], K2 @ B[:, v1], K2 @ G[:, v1]
             A[:, x2, x2] += second.step
             A[:, x2, v1] -= K2
+            A[:, x2, e] += of_fixes @ H[:, 2:] @ Phi
+            B[:, x2] += of_fixes @ H[:, 2:]
+            G[:, x2, 2:] += of_fixes
         driven = B @ Q @ np.swapaxes(B, -1, -2) + G @ R1[steps] @ np.swapaxes(G, -1, -2)
         joints = _covariances(A, driven, joint)[1:]
         joint = joints[-1]

@@ -26,6 +26,8 @@ from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 ROWS = [DP.start, DP.start + 1, PHI.stop - 1]  # states that they show: place east, north, heading
+ANYWHERE = np.array([earth.SEMI_MAJOR, earth.SEMI_MAJOR, math.pi])  # one sigma, m and rad, of what is not known at all
+BOUNDLESS = 1e12  # m or rad: with errors as large as this every fix is taken
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class FixRows:
         Of the fixes.
     least : (M, 3) array
         One sigma, at least, of the error of the answer before each fix; zero where the filter knows it.
+    anew : bool
+        What a fix shows begins anew with it, as if nothing had been known of it: of methods that do not know how wrong they are.
     """
 
     epoch: NDArray[np.int64]
@@ -51,6 +55,7 @@ class FixRows:
     z: Array
     sigma: Array
     least: Array
+    anew: bool = False
 
     @staticmethod
     def rows(states: int) -> Array:
@@ -59,24 +64,38 @@ class FixRows:
 
     def some(self, kept: NDArray[np.bool_]) -> FixRows:
         """Some of them."""
-        return FixRows(self.epoch[kept], self.time[kept], self.z[kept], self.sigma[kept], self.least[kept])
+        rows = {name: getattr(self, name)[kept] for name in ("epoch", "time", "z", "sigma", "least")}
+        return replace(self, **rows)
 
     def expected(self, errors: Array) -> FixRows:
         """With the errors (K+1, 7), one sigma from the switch on, that the answer has before each fix."""
         return replace(self, least=errors[self.epoch - 1][:, ROWS])
 
+    def unasked(self) -> FixRows:
+        """The same, taken whatever they say."""
+        return replace(self, least=np.full(self.z.shape, BOUNDLESS))
+
+    def unknown(self, there: NDArray[np.bool_], states: int) -> Array:
+        """(..., n, n) what a covariance has in addition before fixes that show these (..., 3); nothing where none begins anew."""
+        rows = self.rows(states)
+        return np.asarray(rows.T @ ((self.anew * there * ANYWHERE**2)[..., None] * rows))
+
     def sigma_of_steps(self, stride: int, count: int) -> Array:
-        """(count, 3) of all fixes within each step of `stride` epochs, weighed together; infinite where there is none."""
-        step = (self.epoch - 1) // stride
-        inside = step < count
+        """(count, 3) of all fixes within each step of `stride` epochs, weighed together; infinite where there is none.
+
+        Where what they show begins anew, the last one of a step counts.
+        """
         information = np.zeros((count, 3))
-        np.add.at(information, step[inside], np.where(np.isfinite(self.z), self.sigma**-2.0, 0.0)[inside])
+        for k, z, size in zip((self.epoch - 1) // stride, self.z, self.sigma, strict=True):
+            there = np.isfinite(z)
+            if k < count:
+                information[k, there] = size[there] ** -2.0 + (0.0 if self.anew else information[k, there])
         with np.errstate(divide="ignore"):
             sigma: Array = information**-0.5
         return sigma
 
 
-def fixes_on(course: Track, seen: Track, fixes: Fixes, start: int) -> FixRows | None:
+def fixes_on(course: Track, seen: Track, fixes: Fixes, start: int, *, anew: bool = False) -> FixRows | None:
     """Fixes as errors of a course at their own times, given to the nearest epochs after the switch; None without any.
 
     Parameters
@@ -86,6 +105,8 @@ def fixes_on(course: Track, seen: Track, fixes: Fixes, start: int) -> FixRows | 
         The same with more epochs, by which the fixes are compared.
     start : int
         Epoch of the switch.
+    anew : bool
+        What they show begins anew with them.
 
     Raises
     ------
@@ -114,6 +135,7 @@ def fixes_on(course: Track, seen: Track, fixes: Fixes, start: int) -> FixRows | 
         shown[order],
         sigma[order],
         np.zeros(shown.shape),
+        anew,
     )
 
 
@@ -128,7 +150,7 @@ def _epoch(course: Track, time: float, start: int) -> int:
 
 
 class Weighed:
-    """What a filter made of its fixes: innovations and their sigma (M, 3), NIS (M,), which it took (M,)."""
+    """What a method made of its fixes: innovations and their sigma (M, 3), NIS (M,), which it took (M,)."""
 
     def __init__(self, fixes: FixRows) -> None:
         self.fixes = fixes
@@ -138,19 +160,32 @@ class Weighed:
     def take(self, number: int, state: FilterState) -> FilterState:
         """The filter behind one fix: all of it is taken, or none."""
         fixes, there = self.fixes, np.isfinite(self.fixes.z[number])
-        H = fixes.rows(state.x.shape[-1])[there]
+        n = state.x.shape[-1]
+        H = fixes.rows(n)[there]
         z, R = fixes.z[number, there], np.diag(fixes.sigma[number, there] ** 2)
-        nu, S = z - H @ state.x, H @ state.P @ H.T + R
-        S += np.diag(np.maximum(fixes.least[number, there] ** 2 + np.diag(R) - np.diag(S), 0.0))
+        if not self._weigh(number, z - H @ state.x, H @ state.P @ H.T):
+            return state
+        Q = fixes.unknown(there, n)
+        system = LinearSystem(np.eye(n)[None], Q[None], H[None], R[None], z[None], np.zeros(n), state.P)
+        after = kalman(system, replace(state, memory=np.zeros(0))).state
+        return replace(after, memory=state.memory)  # of the gate of the log's rows
+
+    def put_right(self, number: int, x: Array) -> Array:
+        """(3,) what a fix takes off errors (7,) of which nobody but the bands knows the size; zero where it is rejected."""
+        z = self.fixes.z[number]
+        there = np.isfinite(z)
+        off = np.where(there, z - x[ROWS], 0.0)
+        return off * self._weigh(number, off[there], np.zeros((there.sum(), there.sum())))
+
+    def _weigh(self, number: int, nu: Array, P: Array) -> bool:
+        """Whether a fix is taken, by its innovations and the covariance of what was expected of it, or that of the bands."""
+        fixes, there = self.fixes, np.isfinite(self.fixes.z[number])
+        wider = np.maximum(fixes.least[number, there] ** 2 - np.diag(P), 0.0)
+        S = P + np.diag(wider + fixes.sigma[number, there] ** 2)
         self.innovation[number, there], self.sigma[number, there] = nu, np.sqrt(np.diag(S))
         self.nis[number] = nu @ np.linalg.solve(S, nu)
         self.used[number] = self.nis[number] <= chi_square_limit(limit("log's gate"), int(there.sum()))
-        if not self.used[number]:
-            return state
-        n = len(state.x)
-        system = LinearSystem(np.eye(n)[None], np.zeros((1, n, n)), H[None], R[None], z[None], np.zeros(n), state.P)
-        after = kalman(system, replace(state, memory=np.zeros(0))).state
-        return replace(after, memory=state.memory)  # of the gate of the log's rows
+        return bool(self.used[number])
 
     def residuals(self) -> list[Residuals]:
         """Of places and of headings, each a source as any other."""

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from truenorth.core import earth
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import linearised
+from truenorth.damping.fix_rows import ROWS, Weighed
 from truenorth.damping.networks import SCHULER_RATE, Network
 from truenorth.errors.marine import DV, MOTION, PHI, MarineModel
 from truenorth.state.track import Track
@@ -194,6 +195,7 @@ def network_correction(
     x0: Array | None = None,
     warm: bool = True,
     mu: Array | None = None,
+    fixes: Weighed | None = None,
 ) -> Array:
     """The errors that a damping loop would have taken off the course.
 
@@ -214,6 +216,8 @@ def network_correction(
         states begin at zero, the worst switch.
     mu : (K+1,) array, optional
         How far it is damped at each epoch of the course, 0 to 1, after the switch; see :mod:`truenorth.damping.adaptive`.
+    fixes : Weighed, optional
+        Place and heading begin anew with each of them; it keeps what it made of them.
 
     Returns
     -------
@@ -250,13 +254,29 @@ def network_correction(
     alone, _ = transition_and_input(M[deaf], N[deaf], coarse.interval)
     coast = dict(zip(np.flatnonzero(deaf), alone))
     switched = False
+    epochs = np.zeros(0, dtype=int) if fixes is None else _epoch_of(course, start) + fixes.fixes.epoch
+    steps_of = np.minimum((epochs - 1) // stride, len(coarse) - 2)
+    jumps, of_jumps = np.zeros((len(course), MOTION.stop)), np.zeros_like(out)  # by fixes, each from its own epoch on
     for k in range(len(coarse) - 1):
         if x0 is not None and on[k] and not switched:
             s[MOTION], s[MOTION.stop :], switched = x0, 0.0, True
             out[k] = x0
         s = coast[k] @ s if deaf[k] else steps[k] @ s + inputs[k] @ z[k]
+        moved = s[MOTION] - out[k]
+        for number in np.flatnonzero(steps_of == k):
+            assert fixes is not None  # it has this one
+            after = k + 1 - epochs[number] / stride  # of this step
+            off = fixes.put_right(int(number), s[MOTION] - after * moved)
+            s[ROWS] += off
+            jumps[epochs[number] :, ROWS] += off
+            of_jumps[k + 1 :, ROWS] += off
         out[k + 1] = s[MOTION]
-    return np.stack([np.interp(course.time, coarse.time, column) for column in out.T], axis=1)
+    smooth = [np.interp(course.time, coarse.time, column) for column in (out - of_jumps).T]
+    return np.stack(smooth, axis=1) + jumps
+
+
+def _epoch_of(course: Track, start: float | None) -> int:
+    return 0 if start is None else round((start - course.time[0]) / course.interval)
 
 
 def _means(z: Array, stride: int, count: int) -> Array:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from truenorth.aiding.fixes import Fixes
 from truenorth.core.errors import DataError, UsageError
 from truenorth.damping.answer import (
-    Found,
     LogOn,
     corrected,
     even,
@@ -24,23 +22,21 @@ from truenorth.damping.answer import (
     spectrum_of,
     switched,
 )
-from truenorth.damping.bands import Bands, filter_bands, network_bands, widest
 from truenorth.damping.course import without_errors
 from truenorth.damping.drift import likely_drifts
-from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
-from truenorth.damping.fix_rows import FixRows, fixes_on
+from truenorth.damping.filters import Filter
+from truenorth.damping.fix_rows import fixes_on
 from truenorth.damping.log_arm import at_the_imu
-from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
-from truenorth.damping.networks import NO_NETWORK, first_order, second_order
+from truenorth.damping.loop import LONGEST_STEP, eigenvalues
+from truenorth.damping.methods import found_by, loop_of
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import LEAST_NOISE, Reference, reference_of
 from truenorth.damping.result import Damping
-from truenorth.damping.switching import switching
 from truenorth.damping.waves import over_waves
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors, log_errors, log_rows
-from truenorth.errors.marine import MOTION, OF_INS, STATES, MarineModel
+from truenorth.errors.marine import OF_INS, STATES, MarineModel
 from truenorth.navigation.result import Navigation, judged_navigation, last_sigma
 from truenorth.quality.innovations import innovation_evidence, residual_evidence
 from truenorth.records import VelocityRecord
@@ -57,8 +53,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 OF_COURSE = (DEFLECTION, GYRO_AXES, ACCEL_AXES)  # groups of the free INS that go on
-WINDOW = 5.0  # s, of filter 2
-LEAST_WALK = 1e-5  # m/s/sqrt(s), of an IMU without noise
 
 
 def damp_navigation(
@@ -85,7 +79,7 @@ def damp_navigation(
     others : sequence of Group
         Further error states of the navigation; of these the deflection of the vertical and the IMU's axes are known here.
     fixes : Fixes
-        From outside; method ``augmented`` takes them.
+        From outside. The filter of ``augmented`` weighs them; of all other methods place and heading begin anew with them.
     fine : Track, optional
         The same navigation with more epochs, by which the log's rows are compared.
 
@@ -108,8 +102,10 @@ def damp_navigation(
         raise UsageError(f"damping with altitude {result.altitude!r}; expected 'fixed': the height is held at sea")
     if velocity is None and damper.needs_reference:
         raise UsageError(f"damping {damper.method} needs a reference velocity; expected velocity=record")
-    if (fixes.positions or fixes.azimuths) and damper.method != "augmented":
-        raise UsageError(f"fixes with damping {damper.method}; expected damping augmented, whose filter can weigh them")
+    if (fixes.positions or fixes.azimuths) and damper.method == "none":
+        raise UsageError(
+            "fixes with damping none; expected another method, or a navigation without damping, which takes them"
+        )
     if strange := [group.name for group in others if group.name not in OF_COURSE]:
         raise UsageError(f"damping with error states {', '.join(strange)}; expected {', '.join(OF_COURSE)} alone")
     course = even(result.track)
@@ -127,10 +123,10 @@ def damp_navigation(
     finest = course if fine is None else even(fine)
     log = LogOn(None, LogErrors(0.0), False, None) if velocity is None else _log_on(course, velocity, finest, spec)
     drifts, evidence = _with_drift(course, log, spec, others, start)
-    fixed = fixes_on(course, finest, fixes, start)
+    fixed = fixes_on(course, finest, fixes, start, anew=damper.method != "augmented")
     wholes = [_whole(course, log, errors, spec, others, start) for errors in drifts]
     whole = wholes[0]
-    found = _damped(course, log.reference, spec, damper, start, wholes, drifts[0], fixed)
+    found = found_by(course, log.reference, spec, damper, start, wholes, drifts[0], fixed)
     damped = without_errors(course, found.x)
     seen = slice(start, None)
     base = 0.0 if log.reference is None else log.reference.velocity[seen]
@@ -143,7 +139,7 @@ def damp_navigation(
         before=spectra[0],
         after=spectra[1],
         lines=lines_of(course.v_n[seen, :2] - base, course.interval),
-        modes=tuple(eigenvalues(course, _loop(damper), (len(course) - 1) // 2)) if network else (),
+        modes=tuple(eigenvalues(course, loop_of(damper), (len(course) - 1) // 2)) if network else (),
         rejected=0 if found.estimate is None else found.estimate.rejected,
         length=float(course.time[-1] - course.time[start]),
         time=course.time[start:],
@@ -161,7 +157,7 @@ def damp_navigation(
     evidence += [] if not report.rejected else [note("log.rejected", count=report.rejected)]
     if found.switching is not None and found.switching.switches:
         evidence.append(switched(found.switching, course.time))
-    of_fixes = [] if found.estimate is None or found.estimate.fixes is None else found.estimate.fixes.residuals()
+    of_fixes = [] if found.fixes is None else found.fixes.residuals()
     track = course
     if damper.method != "none":
         track = corrected(damped, found, start)
@@ -244,133 +240,3 @@ def _mounted(velocity: VelocityRecord, mounting: Mounting | None) -> VelocityRec
         turned[np.isnan(velocity.velocity[:, 1])] = np.nan
         velocity = replace(velocity, velocity=turned, sigma=None)
     return velocity.shifted(-mounting.latency) if mounting.latency else velocity
-
-
-def _loop(damper: Damper) -> Loop:
-    if damper.method in ("internal", "external"):
-        network = first_order(damper.ratio) if damper.order == 1 else second_order(damper.ratio)
-        return Loop(network, damper.azimuth)
-    return Loop(NO_NETWORK)
-
-
-def _damped(
-    course: Track,
-    reference: Reference | None,
-    spec: ImuSpec,
-    damper: Damper,
-    start: int,
-    wholes: Sequence[Filter],
-    errors: LogErrors,
-    fixes: FixRows | None,
-) -> Found:
-    whole = wholes[0]
-    x = np.zeros((len(course), MOTION.stop))
-    rest = course[start:]
-    if damper.method == "none":
-        return Found(x, None, None, None)
-    if damper.method in ("internal", "external"):
-        return _by_network(course, reference, damper, start, wholes)
-    assert reference is not None  # checked before
-    if damper.method == "augmented":
-        return _augmented(course, reference, start, wholes, fixes)
-    model = MarineModel.from_spec(spec)
-    one = Filter(model, whole.P0[:STATES, :STATES], reference.noise, relinearise=True)
-    two = None if damper.method == "kalman" else change_filter(one, errors, course.interval)
-    kinds = {"filter1": one} if two is None else {"filter1": one, "filter2": two}
-    estimates = run_filters(course, reference.velocity, start=start, kinds=kinds)
-    estimate, known = estimates["filter1"], None
-    if two is not None:
-        samples = max(1, round(3600.0 / course.interval))
-        fused = Fusion(samples=samples)(estimate, estimates["filter2"], course.interval)
-        assert fused.weight is not None  # of a fusion
-        known = fused.weight[:, MOTION], (estimate.x - estimates["filter2"].x)[:, MOTION]
-        estimate = fused
-    x[start:] = estimate.x[:, MOTION]
-    absent = np.asarray(np.isnan(reference.velocity[start:]).any(axis=1))
-    bands = widest([filter_bands(rest, whole, one, two, known, absent) for whole in wholes])
-    return Found(x, bands, estimate, None)
-
-
-def _augmented(
-    course: Track, reference: Reference, start: int, wholes: Sequence[Filter], fixes: FixRows | None
-) -> Found:
-    """By the filter of all errors, in the faster reading of the drift; sigma holds the slower one too, where there are two."""
-    calm = over_waves(course, reference.velocity, reference.noise, start)
-    whole = replace(wholes[0], gate=1.0 - limit("log's gate"), sigma=calm.noise)
-
-    def run(fixed: FixRows | None) -> Estimate:
-        kinds = {"augmented": replace(whole, fixes=fixed)}
-        once = partial(run_filters, course, calm.velocity, start=start, kinds=kinds, seen=calm.course)
-        return once(about=once()["augmented"].x[:, MOTION])["augmented"]
-
-    x = np.zeros((len(course), MOTION.stop))
-    if len(wholes) > 1:  # of a drift that may as well be slower than the filter takes it for
-        absent = np.asarray(np.isnan(calm.velocity[start:]).any(axis=1))
-
-        def bands_of(fixed: FixRows | None) -> Bands:
-            one = replace(whole, fixes=fixed)
-            return widest([filter_bands(course[start:], each, one, absent=absent) for each in wholes[1:]])
-
-        estimate, slower = _with_fixes(fixes, run, bands_of)
-        sigma = estimate.sigma.copy()
-        sigma[:, MOTION] = np.maximum(sigma[:, MOTION], slower.errors)
-        estimate = replace(estimate, sigma=sigma)
-    else:
-        estimate = run(fixes)
-    x[start:] = estimate.x[:, MOTION]
-    return Found(x, None, estimate, None)
-
-
-def _with_fixes(
-    fixes: FixRows | None, run: Callable[[FixRows | None], Estimate], bands_of: Callable[[FixRows | None], Bands]
-) -> tuple[Estimate, Bands]:
-    """A filter that weighs its fixes by bands which follow those that it takes."""
-    bands = bands_of(fixes)
-    if fixes is None:
-        return run(None), bands
-    taken = np.ones(len(fixes.time), dtype=bool)
-    for _ in fixes.time:
-        estimate = run(fixes.expected(bands.errors))
-        assert estimate.fixes is not None  # it was given some
-        if np.array_equal(estimate.fixes.used, taken):
-            break
-        taken = estimate.fixes.used
-        bands = bands_of(fixes.some(taken))
-    return estimate, bands
-
-
-def change_filter(one: Filter, errors: LogErrors, interval: float) -> Filter:
-    """Filter 2, of changes of the velocity that filter 1 smooths.
-
-    What filter 1 takes in of noise changes its velocity as a random walk of the INS's own density ``q`` does, so that a change
-    over T has ``q/sqrt(T)``; a drift of the log adds its own density. Windows that overlap share it: each counts as one of so many.
-    """
-    q = math.hypot(one.model.accel_random_walk, errors.drift * math.sqrt(2.0 / errors.time))
-    return replace(one, sigma=max(q, LEAST_WALK) / math.sqrt(min(interval, WINDOW)), window=WINDOW)
-
-
-def _by_network(
-    course: Track,
-    reference: Reference | None,
-    damper: Damper,
-    start: int,
-    wholes: Sequence[Filter],
-) -> Found:
-    """A network's correction, its bands, and what manoeuvres add to those of internal damping."""
-    loop, at = _loop(damper), float(course.time[start])
-    internal = damper.method == "internal"
-    used = None if internal or reference is None else reference.velocity
-    sigma = np.sqrt(np.mean(course.sigma[:, DV][:, :2] ** 2, axis=1))
-    found = switching(course, loop.network, sigma) if internal else None
-    mu = found.mu if found is not None and damper.switching else np.ones(len(course))
-    x = network_correction(course, loop, used, start=at, ramp=damper.ramp, mu=mu)
-    by_log = used is not None
-    absent = None if used is None else np.asarray(np.isnan(used[start:]).any(axis=1))
-    bands = widest(
-        [network_bands(course[start:], loop, whole, mu[start:], log=by_log, absent=absent) for whole in wholes]
-    )
-    if found is not None:  # a manoeuvre's part alone, as if the rest of the velocity were known
-        still = course.v_n[:, :2] - found.manoeuvre
-        added = network_correction(course, loop, still, start=at, ramp=damper.ramp, mu=mu)
-        bands = bands._replace(errors=np.hypot(bands.errors, added[start:]))
-    return Found(x, bands, None, found if damper.switching else None)
