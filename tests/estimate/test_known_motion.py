@@ -47,11 +47,7 @@ def track():
     log = ImuRecord(time, np.zeros((3000, 3)), np.tile([0.0, 0.0, 9.806], (3000, 1)))
     model = InsModel.from_spec(imu_spec("consumer"))
     sigma = np.repeat([0.05, 0.1, 1.0, 0.01, 0.3], 3)
-<<<<<<< HEAD
-    start = Start.of(State.at(C[0], LAT, v_n=[SPEED, 0.0, 0.0]), np.diag(sigma**2))
-=======
     start = Start.of(State.at(np.eye(3), LAT, v_n=[SPEED, 0.0, 0.0]), np.diag(sigma**2))
->>>>>>> fixa
     return navigate_track(log, start, with_states(model, [fixes()]), [fixes()], interval=0.2, every=5)
 
 

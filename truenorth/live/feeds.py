@@ -101,16 +101,10 @@ class GnssFeed(Feed):
         fixes = self.rows[np.isfinite(self.rows[:, 1:3]).all(axis=1), 1:4]
         if not len(fixes):
             return None
-<<<<<<< HEAD
-        lon = np.unwrap(fixes[:, 1])  # across the date line, too
-        lat, lon, alt = np.median(np.nan_to_num(np.column_stack([fixes[:, 0], lon, fixes[:, 2]])), axis=0)
-        return Position(float(lat), float(eastward(lon, 0.0)), float(alt), 10.0, 20.0)
-=======
         first = float(fixes[0, 1])
         fixes[:, 1] = eastward(fixes[:, 1], first)  # fixes of one place lie on both sides of the date line
         lat, lon, alt = np.median(np.nan_to_num(fixes), axis=0)
         return Position(float(lat), math.remainder(first + float(lon), 2.0 * math.pi), float(alt), 10.0, 20.0)
->>>>>>> fixb
 
     @staticmethod
     def _metres(rows: Array) -> Array:
@@ -118,13 +112,7 @@ class GnssFeed(Feed):
         known = rows[np.isfinite(rows[:, 1:3]).all(axis=1)]
         first = float(known[0, 2]) if len(known) else 0.0
         scale = 6.371e6  # metres to a radian, about: moved or not
-<<<<<<< HEAD
-        lon = rows[:, 2]
-        east = eastward(lon, lon[np.argmax(np.isfinite(lon))])
-        return np.column_stack([rows[:, 1] * scale, east * scale * np.cos(rows[:, 1])])
-=======
         return np.column_stack([rows[:, 1] * scale, eastward(rows[:, 2], first) * scale * np.cos(rows[:, 1])])
->>>>>>> fixb
 
     def fresh(self, rows: Array) -> Array:
         """See :class:`Feed`: fixes with place and velocity of the row before, to the last digit, as noise never has them.
