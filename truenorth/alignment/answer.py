@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.fine import FineAlignment, attitude_history
 from truenorth.alignment.handover import hand_over
-from truenorth.alignment.inference import INFERRED, told_apart
+from truenorth.alignment.inference import INFERRED, apart_from_axes
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import UNIFORM_SIGMA
@@ -43,7 +43,7 @@ def at_epoch(
 
 def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Array, floor: Array) -> Alignment:
     """An answer in navigation axes, with biases as specified and no verdict yet."""
-    spec = told_apart(spec, task.gravity) if where == INFERRED else spec
+    spec = apart_from_axes(spec, task.gravity) if where == INFERRED else spec
     prior = np.sqrt(spec.bias_variance)
     return Alignment(
         status="not_converged",

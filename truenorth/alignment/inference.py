@@ -8,7 +8,7 @@ Random walks: by maximum likelihood of the filter (:mod:`truenorth.alignment.noi
 motion.
 
 The vertical force shows what acts as an accelerometer bias: the bias, and what a scale factor makes of gravity. The filter needs
-their sum; what the answer states is told apart (:func:`told_apart`).
+their sum; what the answer states is taken apart (:func:`apart_from_axes`).
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
     )
 
 
-def told_apart(spec: ImuSpec, gravity: float) -> ImuSpec:
-    """An inferred specification, its accelerometer bias told apart from what axes make of gravity (m/s^2).
+def apart_from_axes(spec: ImuSpec, gravity: float) -> ImuSpec:
+    """An inferred specification, its accelerometer bias apart from what axes make of gravity (m/s^2).
 
     The ratio is what is usual with such noise. Misalignments are taken for as large as scale factors: whatever the attitude, the
     sum that acts stays what the log has shown. A specification with scale factors is one whose filter estimates them: it stays.

@@ -38,7 +38,7 @@ def bridged(
     log : Log
         With these rows.
     begins : bool
-        The run begins there, and its first row may come later.
+        The run begins there: its first row is the next one after the start, and may be stamped late.
 
     Raises
     ------

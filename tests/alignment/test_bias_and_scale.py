@@ -7,7 +7,7 @@ import pytest
 
 import truenorth as tn
 from tests.runs import some
-from truenorth.alignment.inference import told_apart
+from truenorth.alignment.inference import apart_from_axes
 from truenorth.core.units import MICRO_G
 from truenorth.records.specs import PRESETS, ImuSpec, imu_spec
 from truenorth.simulation.scenario import read_scenario
@@ -19,11 +19,11 @@ REST = {"name": "rest", "position": {"lat": "45 deg", "lon": "10 deg"}, "motion"
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_told_apart_the_sum_is_what_the_log_has_shown(name: str) -> None:
+def test_apart_from_axes_the_sum_is_what_the_log_has_shown(name: str) -> None:
     """Whatever the attitude; and in the ratio of the preset with such noise."""
     preset = imu_spec(name)
     shown = ImuSpec(accel_bias=3e-3, accel_bias_instability=1e-4, accel_random_walk=preset.accel_random_walk)
-    apart = told_apart(shown, GRAVITY)
+    apart = apart_from_axes(shown, GRAVITY)
     for up in np.random.default_rng(2).normal(size=(5, 3)):
         acting = apart.bias_variance[3:] + apart.acting_variance(GRAVITY * up / np.linalg.norm(up))
         np.testing.assert_allclose(acting, shown.bias_variance[3:])
@@ -32,7 +32,7 @@ def test_told_apart_the_sum_is_what_the_log_has_shown(name: str) -> None:
 
 def test_scale_factors_that_a_filter_estimates_are_apart_already() -> None:
     spec = imu_spec("tactical")
-    assert told_apart(spec, GRAVITY) is spec
+    assert apart_from_axes(spec, GRAVITY) is spec
 
 
 def _rest(imu: str, run: int, duration: str) -> tuple[tn.Alignment, np.ndarray]:
