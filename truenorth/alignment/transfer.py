@@ -213,7 +213,7 @@ def _aligned(
     """The alignment with what is said of clocks, arm and seat, by a specification and where that comes from."""
     model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     noise, fitted = first
-    handed = partial(hand_over, slave, master, model, spec, said, position=position)
+    handed = partial(hand_over, slave, master, model, spec, said, position=position, errors=errors)
     found = found_in_passes(slave, master, model, handed, said, noise, fitted, what.kind, tell)
     noise = found.noise
     tell("aligning")
@@ -227,23 +227,22 @@ def _aligned(
         """The same measurements of a slave by another specification, with the master's errors estimated."""
         axes = same_axes(other, said, model.groups)
         own = replace(_model(other, said, what, flexure, errors, axes), considered=False)
-        _, begun = hand_over(slave, master, own, other, said, noise, position=position)
+        _, begun = hand_over(slave, master, own, other, said, noise, position=position, errors=errors)
         return run(part, model=own, start=begun)
 
     def of_another_master(drift: float) -> Track:
         """The same of a master whose heading drifts by so much, rad; its errors are estimated."""
         of = replace(errors, heading_drift=drift)
         own = replace(_model(spec, said, what, flexure, of, model.axes), considered=False)
-        _, begun = hand_over(slave, master, own, spec, said, noise, position=position)
+        _, begun = hand_over(slave, master, own, spec, said, noise, position=position, errors=of)
         return run(part, model=own, start=begun, nominal=found.nominal.with_states(own.states))
 
     seen = _seen(slave, master, errors, said)
     seen += _rivals(part, run, track, model, start, spec, said, of_another_imu, of_another_master)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
     track = as_said_together(track, model, said, what.attitude)
-    carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
-    last = LastPass(part, master, model, said, start, what, noise, track, carried, least, found.left)
+    last = LastPass(part, master, model, said, start, what, noise, track, errors, least, found.left)
     return assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
 
 

@@ -86,10 +86,24 @@ class LastPass(NamedTuple):
     what: Matched
     noise: tuple[float, float]  # of translation and attitude of the master's rows
     track: Track
-    # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
-    carried: float = 0.0
+    errors: MasterErrors = MasterErrors()  # of the master, all that is said; the model has those that its rows bear as states
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
     left: float = 0.0  # sigmas that the last pass that sought the motion has still moved it by
+
+    @property
+    def carried(self) -> float:
+        """Error of the master's velocity that its positions bear, and the slave's velocity with them, m/s."""
+        return math.hypot(self.errors.velocity, self.errors.velocity_drift) if self.what.kind == "position" else 0.0
+
+    @property
+    def considered(self) -> bool:
+        """Whether what the master's errors do to the rows that are matched is in sigma.
+
+        Of positions that is how fast their error changes: a constant error of a velocity goes into the slave's velocity, its drift
+        counts as noise of the accelerometers (`accel_random_walk`); an attitude's error does not act on them.
+        """
+        borne = any(self.model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR))
+        return borne or self.carried > 0.0
 
 
 def assemble_transfer(
@@ -138,7 +152,7 @@ def assemble_transfer(
 
 
 def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Transfer:
-    _, master, model, assumed, _, what, noise, track, carried, *_ = last
+    _, master, model, assumed, _, what, noise, track, errors, *_ = last
     sigma, aux, C_mb = track.sigma[-1], track.sensors[-1], axes_along(track, assumed)[-1]
     tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
@@ -165,9 +179,9 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
         used=int(np.sum(np.any((verdict == USED) | (verdict == REOPENED), axis=1))),
         rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
-        P=_placed(P, Position(0.0), carried),
-        relative_sigma=_relative(track, model),
-        considered=any(model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR)),
+        P=_placed(P, Position(0.0), last.carried),
+        relative_sigma=_relative(track, model, errors),
+        considered=last.considered,
         jumps=_jumps(track, said, what),
         open=_open(last),
         notes=(*notes, *silences),
@@ -209,14 +223,18 @@ def _course(model: TransferModel, assumed: Assumed, track: Track) -> Relation:
     )
 
 
-def _relative(track: Track, model: TransferModel) -> Array:
-    """(3,) sigmas of heading, pitch and roll against the master's own solution: ``phi - m``."""
+def _relative(track: Track, model: TransferModel, errors: MasterErrors) -> Array:
+    """(3,) sigmas of heading, pitch and roll against the master's own solution: ``phi - m``.
+
+    Where the master's attitude is not matched, its error is none of the slave's, and is added to it.
+    """
     P, at = track.P[-1], model.slice_of(ATTITUDE_ERROR)
     J = np.zeros((3, model.states))
     J[:, PHI] = np.eye(3)
     if at is not None:
         J[:, at] = -np.eye(3)
-    return euler_sigma(track.C_nb[-1], J @ P @ J.T)
+    apart = np.zeros(3) if at is not None else errors.attitude
+    return euler_sigma(track.C_nb[-1], J @ P @ J.T + np.diag(apart**2))
 
 
 def _placed(P: Array, place: Position, carried: float) -> Array:

@@ -196,6 +196,7 @@ def hand_over(
     assumed: Assumed,
     noise: tuple[float, float],  # (velocity, attitude) m/s and rad: of the master's rows
     position: Position | None,  # where the master gives none
+    errors: MasterErrors,  # all that is said of the master's own, also those that no row bears: it hands the start over
 ) -> tuple[ImuRecord, Start]:
     """The slave's record from the master's first row on, and its first state as the master gives it.
 
@@ -235,7 +236,7 @@ def hand_over(
         if not model.mounting:
             phi = np.hypot(phi, assumed.mounting_sigma)
         if ATTITUDE_ERROR not in model.groups:  # not matched, and handed over once
-            phi = np.hypot(phi, [model.master.level, model.master.level, model.master.heading])
+            phi = np.hypot(phi, errors.attitude)
     else:
         C = _from_course(master, assumed, f)
         phi = np.array([LEVEL_SIGMA, LEVEL_SIGMA, COURSE_SIGMA])

@@ -103,6 +103,11 @@ class MasterErrors:
             )
 
     @property
+    def attitude(self) -> Array:
+        """(3,) sigmas of the errors about east, north and up, constant and drift, rad."""
+        return np.hypot([self.level, self.level, self.heading], self.attitude_drifts)
+
+    @property
     def attitude_drifts(self) -> tuple[float, float, float]:
         """Sigmas of the drift about east, north and up, rad."""
         level = self.attitude_drift
@@ -242,11 +247,10 @@ class TransferModel(Walks):
         if any(self.flexure_sigma):
             found.append(Group(FLEXURE, np.array(self.flexure_sigma), frequency=self.flexure_beta, unit="rad"))
         found += self.axes
-        for name, constant, drift, unit in (
-            (VELOCITY_ERROR, np.full(3, of.velocity), np.full(3, of.velocity_drift), "m/s"),
-            (ATTITUDE_ERROR, np.array([of.level, of.level, of.heading]), np.array(of.attitude_drifts), "rad"),
+        for name, sigma, drift, unit in (
+            (VELOCITY_ERROR, np.full(3, math.hypot(of.velocity, of.velocity_drift)), np.full(3, of.velocity_drift), "m/s"),
+            (ATTITUDE_ERROR, of.attitude, np.array(of.attitude_drifts), "rad"),
         ):
-            sigma = np.hypot(constant, drift)
             if sigma.any():
                 lasts = of.correlation_time * np.divide(sigma**2, drift**2, out=np.full(3, np.inf), where=drift > 0.0)
                 found.append(Group(name, sigma, lasts, considered=self.considered, unit=unit))

@@ -226,7 +226,7 @@ SENTENCES = {
         "vibration moves the slave against its master by {size:.2g} m/s, at a phase that the delay does not tell: level may be off "
         "by {level:angle} (one sigma), which its sigma has; give lever arm and delay with smaller sigmas"
     ),
-    "transfer.relative": "sigma is against the master, whose own errors come on top: they were not given",
+    "transfer.relative": "sigma is against the master, whose own errors come on top: none of what is matched were given",
     "transfer.open": "left open by this motion: {states}",
     # ---- clocks, arms, scales and mountings left open
     "second_look.late": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s late",
