@@ -146,8 +146,8 @@ def align_transfer(
     arm, lever_arm_sigma = _arm(lever_arm, lever_arm_sigma)
     angles = _three(mounting, "mounting", "radians: heading, pitch, roll of the slave seen from the master")
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
-    if flexure is not None and not what.attitude:
-        raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
+    if flexure is not None and master.C_nb is None:
+        raise UsageError("flexure is seen by the master's attitude, which its log does not hold; leave it out")
     spec = imu_spec(USUAL if imu is None else imu)
     where = f"specification {spec.name}"
     record = slave
@@ -349,6 +349,8 @@ def _model(
         of_rows = replace(of_rows, attitude_drift=0.0, heading_drift=None, level=0.0, heading=0.0)
     bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
     model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, of_rows, axes)
+    if flexure is not None and what.translation is not None:
+        model = replace(model, coupling=flexure.coupling, coupling_sigma=flexure.coupling_sigma)
     if what.translation == "position":  # place and velocity are against a master whose own velocity error wanders
         walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
         model = replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))

@@ -55,7 +55,7 @@ class Split:
     """
 
     def __init__(self, rates: Array, begins: float, interval: float, edge: float) -> None:
-        self.begins, self.interval, self.rows = begins, interval, len(rates)
+        self.begins, self.interval, self.edge, self.rows = begins, interval, edge, len(rates)
         self._whole = np.fft.rfft(np.concatenate([rates, rates[::-1]]), axis=0)  # there and back: no jump at the ends
         self._f = np.arange(len(self._whole))[:, None] / (2.0 * len(rates) * interval)
         self._passed = 0.5 * (1.0 + np.cos(math.pi * np.clip(self._f / edge - 1.0, 0.0, 1.0)))
@@ -111,6 +111,11 @@ class Shaken:
 
     def __init__(self, split: Split, times: Array) -> None:
         self.split, self.times = split, times
+
+    def alike(self, rates: Array) -> Shaken:
+        """Other rates (N, 3) of the same samples, split at the same frequency."""
+        own = self.split
+        return Shaken(Split(rates, own.begins, own.interval, own.edge), self.times)
 
     @property
     def slow(self) -> Array:
@@ -185,9 +190,19 @@ def spins_at(slave: ImuRecord, times: Array, walk: float, arm: float, push: floa
         # What a spin has in common with a rate off its middle is as a part of it: walk^2 / half^2.
         common = (walk * arm / half) ** 2
         if half > 2.0 * T and 4.0 * common / half < enough and common < ASKEW * push**2:
-            late, early = (_mean_rate(slave, times + s, 0.5 * half) for s in (0.5 * half, -0.5 * half))
-            return (late - early) / half, MEAN
+            return spins_of(slave, times, half), MEAN
     return None, UNKNOWN
+
+
+def spins_of(slave: ImuRecord, times: Array, half: float) -> Array:
+    """(M, 3) mean derivatives of the rate about some times, over so long before and after, rad/s^2."""
+    late, early = (_mean_rate(slave, times + s, 0.5 * half) for s in (0.5 * half, -0.5 * half))
+    return np.asarray((late - early) / half)
+
+
+def rates_at(slave: ImuRecord, times: Array) -> Array:
+    """(M, 3) rates at some times, rad/s: means over two samples before and after."""
+    return _mean_rate(slave, times, 2.0 * slave.interval)
 
 
 def push_of(time: Array, v_n: Array) -> float:

@@ -65,9 +65,14 @@ class Flexed:
         self.span = start, start + duration
         self.knots = start + step * np.arange(math.ceil(duration / step) + 2)
         rng = Draws("flexure", seed, run, scenario)("")
-        angles, rates = second_order_gauss_markov(np.array(spec.sigma), spec.beta, step, len(self.knots), rng)
+        angles, rates = self.drawn(rng)
         self._angles: Any = CubicHermiteSpline(self.knots, angles, rates)
         self._rates, self._accelerations = self._angles.derivative(1), self._angles.derivative(2)
+
+    def drawn(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Heading, pitch and roll relative to the rigid body at the knots, and how fast they change, (K, 3) rad and rad/s."""
+        step = float(self.knots[1] - self.knots[0])
+        return second_order_gauss_markov(np.array(self.spec.sigma), self.spec.beta, step, len(self.knots), rng)
 
     @property
     def breaks(self) -> Array:
