@@ -1,7 +1,7 @@
 """A slave at the end of a structure that bends, in worlds of our own: wings and ships' hulls that ring at their own frequencies.
 
-What a structure does is no process of an estimator's model: tones of half to one and a half of its frequency, at random phases, about
-its axis of most compliance, a tenth of it about the others. The end moves by a coupling that is drawn, .4 to 1
+What a structure does is no process of an estimator's model: tones of half to one and a half of its frequency, at random phases,
+about its axis of most compliance, a tenth of it about the others. The end moves by a coupling that is drawn, .4 to 1
 (:mod:`truenorth.errors.bending`). What is said with `--flexure` is the size and the time that an engineer would say: the RMS about
 each axis, and a correlation time of ``2.15 / (2 pi f)``. Drawn besides: delay (50 ms), mounting (3 deg), an arm known to .3 m.
 """

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from benchmarks.honesty.frame import Case, Outcome, main
 from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.aiding.matching import What
-from truenorth.alignment.transfer import DELAY_WALK, align_transfer
+from truenorth.alignment.transfer import align_transfer
+from truenorth.alignment.transfer_start import DELAY_WALK
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.errors.master import MasterErrors

@@ -4,7 +4,8 @@ The master is late by tau, stands at -r in the slave (r: from master to slave, s
 master axes, ``C_mb true = (I + [mu x]) C_mb assumed``); the slave's seat bends by theta:
 
     velocity   z = v_hat - C_hat (w_hat x r) - v_master
-                 = dv + a (tau + lambda) - a' chi + a'' kappa + C [w x] dr + phi x C (w x r) - C ((eps + M w) x r) + C (dk theta' x r) - db
+                 = dv + a (tau + lambda) - a' chi + a'' kappa + C [w x] dr + phi x C (w x r) - C ((eps + M w) x r)
+                   + C (dk theta' x r) - db
     attitude   C_hat (C_master C_mb)' = exp(-[z x]),   z = phi - C w_nb tau - C_master mu - C theta - dm
 
 with `a` the *master's* acceleration: the slave's holds that of the arm itself, which would tell a delay from the master's
@@ -112,8 +113,8 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
     Columns of the arm are of a rate with another noise than that of `z`: one that is in both (4 cm/s of an industrial gyro at
     37 m) is taken for an arm that is too long, .6 m of it. Its own figures: the variance of a component of that rate; and 1 where
-    the slave's spin is measured, rad/s^2, 2 where the acceleration is not known (:mod:`truenorth.alignment.transfer_turns`); the coupling of a
-    seat that bends (3).
+    the slave's spin is measured, rad/s^2, 2 where the acceleration is not known (:mod:`truenorth.alignment.transfer_turns`); the
+    coupling of a seat that bends (3).
     """
     if np.isnan(measured[0]):
         return

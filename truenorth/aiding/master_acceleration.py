@@ -51,8 +51,8 @@ _PHI, _BA = PHI.start, BA.start
 def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     """Measured: the master's specific force, east, north, up; the slave's w' and f_b', NaN where its log ends.
 
-    Behind these how fast the seat bends, rad/s, and how fast that changes, rad/s^2, body axes, or NaN. Its own figures: the force at
-    rest besides which the accelerometers' axes act; the coupling of a seat that bends (3).
+    Behind these how fast the seat bends, rad/s, and how fast that changes, rad/s^2, body axes, or NaN. Its own figures: the force
+    at rest besides which the accelerometers' axes act; the coupling of a seat that bends (3).
     """
     if np.isnan(measured[0]):
         return
@@ -115,7 +115,7 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
             spins = measured[12 + j]
             roll = times(C, cross((spins * (j == 0), spins * (j == 1), spins * (j == 2)), r))
             for i in range(3):
-                H[i, at[AT_FLEXURE] + j] = -roll[i]
+                H[i, at[AT_FLEXURE] + j] = roll[i]
     into_north(now, H, z)
     if at[AT_BIAS] >= 0:  # an error of the master's attitude stands along east, north, up, as what it said
         m, of = (measured[0], measured[1], measured[2]), at[AT_BIAS]

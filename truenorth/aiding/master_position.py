@@ -5,8 +5,8 @@ The master stands at -r in the slave (r: from master to slave, slave axes) and i
     position   z = p_hat - C_hat r - p_master = dp + v_m tau + phi x C r + C dr,   v_m = v - C (w x r)
 
 where the seat bends by `theta`, with the arm ``r - ((1 - k) theta) x r`` (:mod:`truenorth.errors.bending`) and its column
-``C (dk theta x r)``; with `v_m` the *master's* velocity: with an arm of 30 m on a ship that rolls it differs from the slave's by a metre a second,
-which is all of it that tells a delay while the ship goes straight on.
+``C (dk theta x r)``. `v_m` is the *master's* velocity: with an arm of 30 m on a ship that rolls it differs from the slave's by a
+metre a second, which is all of it that tells a delay while the ship goes straight on.
 
 Source: Xia Jiahe et al., "Study on transfer alignment algorithm considering space-time difference", Navigation Positioning
 and Timing 3 (2016), eq. 5, which takes the slave's velocity; the sign of tau is that of its (9), right where the reference is
@@ -34,8 +34,8 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     """Measured: latitude, longitude (rad) and height (m) of the master; a rate of the slave.
 
     The rate is what its gyros say, body axes, or NaN: that of the instant. Its own figure: the variance of a component of it,
-    (rad/s)^2. What is within that noise tells of no delay, as in a row of attitude. Behind the rate how far the seat bends, rad, body
-    axes, or NaN; of its coupling three figures more.
+    (rad/s)^2. What is within that noise tells of no delay, as in a row of attitude. Behind the rate how far the seat bends, rad,
+    body axes, or NaN; of its coupling three figures more.
     """
     if np.isnan(measured[0]):
         return

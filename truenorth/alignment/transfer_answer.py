@@ -41,7 +41,6 @@ from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
-
 Array = NDArray[np.float64]
 
 MOST_EPOCHS = 400  # of the linear system that says what is separated
@@ -88,7 +87,9 @@ class LastPass(NamedTuple):
     what: Matched
     noise: tuple[float, float]  # of translation and attitude of the master's rows
     track: Track
-    errors: MasterErrors = MasterErrors()  # of the master, all that is said; the model has those that its rows bear as states
+    errors: MasterErrors = (
+        MasterErrors()
+    )  # of the master, all that is said; the model has those that its rows bear as states
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
     left: float = 0.0  # sigmas that the last pass that sought the motion has still moved it by
 

@@ -1,19 +1,20 @@
 """How a slave turns against its master's rigid body: what bends between them, by the master's attitudes and the slave's gyros.
 
-The master's attitudes, through the mounting, are those of the rigid body; it moves slowly, and a cubic spline leads from row to row. The
-slave's attitude is carried by its gyros. The angle between both,
+The master's attitudes, through the mounting, are those of the rigid body, and a cubic spline leads from row to row. The slave's
+attitude is carried by its gyros. The angle between both,
 
     theta = log(C_rigid' C_slave)
 
-has what the seat bends, a constant (the mounting), what drifts, and noise: below half the rate of the rows that of the master's
-attitudes, above it that of the gyros. Of it stays what is expected where noise of the density N is known of (Wiener's filter),
+has what the seat bends, a constant (the mounting), what drifts, and noise. Where the master's spectrum is no more than its noise,
+and beyond half the rate of its rows, the body does not move: what the gyros show is the seat. What is left is what is expected
+where noise of the density N is known of (Wiener's filter),
 
     theta_hat(f) = S(f) / (S(f) + N(f)) theta(f),    S = 4 beta^3 sigma^2 / ((2 pi f)^2 + beta^2)^2
 
-with S of the second-order process that was said. So what it does to the arm (:mod:`truenorth.errors.bending`) is a known motion in each
-row, and the coupling a constant that is estimated. A state of theta by itself does not do: it is known from row to row by the master's
-attitudes alone, though the gyros in the same row show it, and a filter that takes the one for independent of the other finds the
-arm ``k`` times as long as it is, tens of its sigmas off.
+with S of the second-order process that was said. So what it does to the arm (:mod:`truenorth.errors.bending`) is a known motion in
+each row, and the coupling a constant that is estimated. A state of theta by itself does not do: from row to row the master's
+attitudes alone show it, though the gyros in the same row do, too. A filter that takes the one for independent of the other
+finds the arm `k` times as long as it is, tens of its sigmas off.
 
 Source: N. Wiener, "Extrapolation, interpolation, and smoothing of stationary time series" (1949). The use of it is ours.
 """
@@ -82,7 +83,7 @@ class Bend:
         return slave._with(gyro=dtheta - share * np.diff(self.angles, axis=0), accel=dvel, kind="increments")
 
     def chord(self, slave: ImuRecord, arm: Array | None = None) -> ImuRecord:
-        """A slave that turns with the chord of the arm; of a given one, m, without the force that moves its end against the body."""
+        """A slave that turns with the chord of the arm; of a given one, m, without the force that moves its end."""
         seat = self.without(slave, 1.0 - self.coupling)
         if arm is None:
             return seat
@@ -187,5 +188,3 @@ def filtered(values: Array, gain: Array) -> Array:
     """(N, 3) values through a filter without delay, (F, 3) by :func:`frequencies`."""
     whole = np.fft.rfft(np.concatenate([values, values[::-1]]), axis=0)
     return np.asarray(np.fft.irfft(whole * gain, 2 * len(values), axis=0)[: len(values)])
-
-

@@ -19,7 +19,18 @@ from truenorth.alignment.transfer_bending import Bend
 from truenorth.alignment.transfer_columns import OTHER_NOISE, Columns
 from truenorth.alignment.transfer_nominal import Nominal
 from truenorth.alignment.transfer_rows import stamped_as_the_master
-from truenorth.alignment.transfer_turns import HALVES, KNOWN, MEAN, push_of, rates_at, shaken, spins_at, spins_of, turns_at
+from truenorth.alignment.transfer_turns import (
+    HALVES,
+    KNOWN,
+    MEAN,
+    push_of,
+    rates_at,
+    shaken,
+    slopes_at,
+    spins_at,
+    spins_of,
+    turns_at,
+)
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.core.errors import DataError
@@ -43,13 +54,10 @@ from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI
 from truenorth.state.state import Start
 from truenorth.state.track import Track
-from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
 LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body turn little in it
-SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
-SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
 
 
 @dataclass(frozen=True)
@@ -197,7 +205,7 @@ def master_aiding(
     measured = _translation(master, kind, place, linear) if np.isfinite(matching.sigma) else None
     if measured is not None and slave is not None:
         if kind == "acceleration":
-            measured[:, 3:9] = _slopes(slave if bend is None else bend.chord(slave, assumed.lever_arm), held)
+            measured[:, 3:9] = slopes_at(slave if bend is None else bend.chord(slave, assumed.lever_arm), held)
             if bend is not None:
                 measured[:, 9:12], measured[:, 12:15] = bend.at(held, 1), bend.at(held, 2)
         elif kind == "velocity":
@@ -365,29 +373,6 @@ def _quaternions(C: Array) -> Array:
     known = np.isfinite(C).all(axis=(1, 2))
     found[known] = quaternion_from_dcm(C[known])
     return found
-
-
-def _slopes(slave: ImuRecord, times: Array) -> Array:
-    """(M, 6) derivatives of the slave's rate and specific force; NaN at the ends.
-
-    From means over `SLOPE` before and after; where those over `SHARP` differ by more than their noise, these: a mean that looks
-    ahead would see a manoeuvre begin before it does, and take the agreement of both forces until then for knowledge of the delay.
-    """
-    edges = np.append(slave.time[0] - slave.steps[0], slave.time)
-    whole = np.vstack([np.zeros(6), np.cumsum(np.column_stack(increments(slave)), axis=0)])
-
-    def over(h: float) -> Array:
-        before, now, after = (
-            np.column_stack([np.interp(times + shift, edges, column) for column in whole.T]) for shift in (-h, 0.0, h)
-        )
-        return np.asarray((after - 2.0 * now + before) / h**2)
-
-    smooth, sharp = over(SLOPE), over(max(SHARP, slave.interval))
-    inside = (times - SLOPE >= edges[0]) & (times + SLOPE <= edges[-1])
-    apart = np.abs(sharp - smooth)
-    noise = 1.4826 * np.median(apart[inside], axis=0) if inside.any() else 0.0
-    moved = np.any(apart > APART * noise, axis=1)[:, None]  # all six alike: their columns tell delay from arm
-    return np.where(inside[:, None], np.where(moved, sharp, smooth), np.nan)
 
 
 def _acceleration(master: MasterRecord, place: Array | None) -> Array:

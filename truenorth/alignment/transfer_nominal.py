@@ -38,7 +38,15 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 Array = NDArray[np.float64]
 
 LINEAR = 0.02  # rad: of an attitude to linearise with, one sigma
-CONSTANTS = (DELAY, FILTER, ARM, MOUNTING, GYRO_AXES, ACCEL_AXES, BENDING)  # groups of what does not change in a log, or hardly
+CONSTANTS = (
+    DELAY,
+    FILTER,
+    ARM,
+    MOUNTING,
+    GYRO_AXES,
+    ACCEL_AXES,
+    BENDING,
+)  # groups of what does not change in a log, or hardly
 
 
 @dataclass(frozen=True)

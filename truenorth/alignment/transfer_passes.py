@@ -25,7 +25,7 @@ from truenorth.alignment.transfer_filter import (
     master_aiding,
     transfer_filter,
 )
-from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_for, found_by
+from truenorth.alignment.transfer_nominal import Carried, Nominal, carried_back, carried_for, found_by
 from truenorth.alignment.transfer_rows import by_rows
 from truenorth.alignment.transfer_smoothed import LONGEST, flatter_along
 from truenorth.errors.bending import BENDING
@@ -196,14 +196,13 @@ def _linear(
 ) -> Linear:
     """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own.
 
-    Where rows of velocity with this noise, m/s, come next, with what their filter makes flatter; in an open loop, their columns. Of a
-    seat that bends, how.
+    Where rows of velocity with this noise, m/s, come next, with what their filter makes flatter; in an open loop, their columns.
+    Of a seat that bends, how.
     """
     C_nb, carried = np.full((len(master), 3, 3), np.nan), carried_back(slave, track, carried_for(slave, model))
     rows = np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)
     C_nb[rows] = carried.C_nb
-    C_mb = axes_along(track, assumed)[-1]
-    C_nm = C_nb @ C_mb.T
+    C_nm = C_nb @ axes_along(track, assumed)[-1].T
     if master.C_nb is not None:
         C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
     tau = track.layout.slice_of(DELAY)
@@ -217,10 +216,10 @@ def _linear(
     held = master.time - assumed.delay - late - of_filter
     bend = None
     if any(model.flexure_sigma) and master.C_nb is not None:
-        C_rigid = np.swapaxes(carried.C_n0, 1, 2) @ master.C_nb[rows] @ C_mb
+        C_rigid, when = rigid_rows(master, track, carried, assumed)
         own_k = track.layout.slice_of(BENDING)
         coupling = np.array(model.coupling) + (0.0 if own_k is None else track.sensors[-1, own_k])
-        bend = bend_along(slave, carried, C_rigid, master.time[rows] - assumed.delay - late, model, coupling)
+        bend = bend_along(slave, carried, C_rigid, when, model, coupling)
     if sigma is not None:
         if of_filter != 0.0:
             C_late = np.full_like(C_nb, np.nan)
@@ -232,6 +231,18 @@ def _linear(
         calibrated = before is not None and before.columns is not None
         columns = columns_along(slave, track, carried, model, held, said, sigma, calibrated, bend)
     return Linear(C_nm, C_nb, late, begin, phase, columns, flatter=flatter, late=of_filter, C_late=C_late, bend=bend)
+
+
+def rigid_rows(master: MasterRecord, track: Track, carried: Carried, assumed: Assumed) -> tuple[Array, Array]:
+    """Attitudes of the rigid body (K, 3, 3) at a master's rows, by its own and the mounting, in the axes in which `carried.q` is.
+
+    With them the times at which they held (K,), s, by what a pass has found.
+    """
+    assert master.C_nb is not None
+    rows, tau = np.searchsorted(master.time - assumed.delay, by_rows(track).stamp), track.layout.slice_of(DELAY)
+    late = 0.0 if tau is None else float(track.sensors[-1, tau][0])
+    C_nb = master.C_nb[rows] @ axes_along(track, assumed)[-1]
+    return np.swapaxes(carried.C_n0, 1, 2) @ C_nb, master.time[rows] - assumed.delay - late
 
 
 def _with_scatter(found: Linear, before: Linear | None, track: Track, sources: list[Aiding]) -> Linear:

@@ -90,7 +90,9 @@ def flatter_along(
     means, walk, push = Means(slave, track, carried, held, arm, bend), model.gyro_random_walk, model.accel_random_walk
     lengths = [h for h in HALVES if h > 2.0 * slave.interval]
 
-    def shown(ideal: float, known: float, derivative: Callable[[float, bool], Array], noise: tuple[int, int, int]) -> Array:
+    def shown(
+        ideal: float, known: float, derivative: Callable[[float, bool], Array], noise: tuple[int, int, int]
+    ) -> Array:
         """(M, 3) a derivative by the shortest means whose noise is little, and what of it is no noise."""
         of_push, of_walk, order = noise
         shortest = max(ideal, 2.0 * lengths[0])

@@ -33,6 +33,8 @@ INSTANT = 0.85  # variance of the rate at an epoch, of that of a sample (`descri
 HALVES = (0.05, 0.1, 0.2, 0.4, 0.8)  # s, before and after
 SHARE = 0.01  # of what tells the delay, that may be noise
 ASKEW = 5e-4  # s: of a false delay, by what the noise of a spin and of a velocity's arm have in common
+SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
+SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
 # The acceleration of a velocity row: by the master or the instant, by a mean spin, or not.
 KNOWN, MEAN, UNKNOWN = 0.0, 1.0, 2.0
 # Points of the fast part a row: a straight line from one to the next is a tone of five rows a period within 1 %.
@@ -203,6 +205,29 @@ def spins_of(slave: ImuRecord, times: Array, half: float) -> Array:
 def rates_at(slave: ImuRecord, times: Array) -> Array:
     """(M, 3) rates at some times, rad/s: means over two samples before and after."""
     return _mean_rate(slave, times, 2.0 * slave.interval)
+
+
+def slopes_at(slave: ImuRecord, times: Array) -> Array:
+    """(M, 6) derivatives of the slave's rate and specific force; NaN at the ends.
+
+    From means over `SLOPE` before and after; where those over `SHARP` differ by more than their noise, these: a mean that looks
+    ahead would see a manoeuvre begin before it does, and take the agreement of both forces until then for knowledge of the delay.
+    """
+    edges = np.append(slave.time[0] - slave.steps[0], slave.time)
+    whole = np.vstack([np.zeros(6), np.cumsum(np.column_stack(increments(slave)), axis=0)])
+
+    def over(h: float) -> Array:
+        before, now, after = (
+            np.column_stack([np.interp(times + shift, edges, column) for column in whole.T]) for shift in (-h, 0.0, h)
+        )
+        return np.asarray((after - 2.0 * now + before) / h**2)
+
+    smooth, sharp = over(SLOPE), over(max(SHARP, slave.interval))
+    inside = (times - SLOPE >= edges[0]) & (times + SLOPE <= edges[-1])
+    apart = np.abs(sharp - smooth)
+    noise = 1.4826 * np.median(apart[inside], axis=0) if inside.any() else 0.0
+    moved = np.any(apart > APART * noise, axis=1)[:, None]  # all six alike: their columns tell delay from arm
+    return np.where(inside[:, None], np.where(moved, sharp, smooth), np.nan)
 
 
 def push_of(time: Array, v_n: Array) -> float:

@@ -1,12 +1,12 @@
 """How far the end of a structure moves for what it turns: the coupling of an arm that bends.
 
-A wing, a pylon or a hull that bends turns the slave at its end by `theta` against the rigid body (slave axes), and moves it, too: at an
-arm `r` from where the structure is clamped by
+A wing, a pylon or a hull that bends turns the slave at its end by `theta` against the rigid body (slave axes), and moves it, too:
+at an arm `r` from where the structure is clamped by
 
     delta = (k theta) x r,    k by axis
 
-so that the chord of the arm turns by ``k theta``. Of a slender beam that is clamped at one end (`P` a force, `q` a force a metre, `M` a
-moment, `E I` the stiffness):
+so that the chord of the arm turns by ``k theta``. Of a slender beam that is clamped at one end (`P` a force, `q` a force a metre,
+`M` a moment, `E I` the stiffness):
 
     | bent by                          | end moves by      | end turns by     | k     |
     | moment at the end                | M L^2 / (2 E I)   | M L / (E I)      | 1/2   |
@@ -16,8 +16,8 @@ moment, `E I` the stiffness):
     | force spread evenly              | q L^4 / (8 E I)   | q L^3 / (6 E I)  | 3/4   |
     | rigid, about a hinge at the root | theta L           | theta            | 1     |
 
-Gyros of the slave show `theta'` with the body's rate `w`, and a lever arm that is worked out by them has ``k = 1``. What its end does
-against the master is
+Gyros of the slave show ``theta'`` with the body's rate `w`, and a lever arm that is worked out by them has ``k = 1``. What its end
+does against the master is
 
     v - v_master = C ((w - (1 - k) theta') x r),    p - p_master = C (r - ((1 - k) theta) x r)
 

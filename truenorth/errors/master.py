@@ -256,7 +256,12 @@ class TransferModel(Walks):
         if any(self.flexure_sigma) and self.coupling_sigma > 0.0:
             found.append(bending(self.coupling_sigma))
         for name, sigma, drift, unit in (
-            (VELOCITY_ERROR, np.full(3, math.hypot(of.velocity, of.velocity_drift)), np.full(3, of.velocity_drift), "m/s"),
+            (
+                VELOCITY_ERROR,
+                np.full(3, math.hypot(of.velocity, of.velocity_drift)),
+                np.full(3, of.velocity_drift),
+                "m/s",
+            ),
             (ATTITUDE_ERROR, of.attitude, np.array(of.attitude_drifts), "rad"),
         ):
             if sigma.any():

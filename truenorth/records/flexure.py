@@ -27,8 +27,8 @@ class FlexureSpec(UnitSpec):
     coupling_sigma : float
         What an alignment takes each to be uncertain by.
     arm : (3,) floats, m
-        From where the structure is clamped to the slave, slave axes, of one that is simulated. Zeros: the slave turns in its place, as
-        on a mount that yields. An alignment takes the lever arm.
+        From where the structure is clamped to the slave, slave axes, of one that is simulated. Zeros: the slave turns in its place,
+        as on a mount that yields. An alignment takes the lever arm.
     """
 
     sigma: tuple[float, float, float] = value("angle angle angle", "arcmin arcmin arcmin", (0.0, 0.0, 0.0))

@@ -115,7 +115,7 @@ class Flexed:
 
 
 def shifted(at: MotionStates, away: Array, speed: Array, acceleration: Array) -> MotionStates:
-    """The motion of a point of a body that is displaced in the body's axes, (..., 3) m, m/s, m/s^2, and does not turn against it."""
+    """The motion of a point of a body that is displaced in the body's axes, (..., 3) m, m/s, m/s^2, and does not turn."""
     lat, lon, alt, v_n = place_of(at, away)
     w, moving = at.w_ib_b, (at.C_nb @ speed[..., None])[..., 0]
     more = acceleration + 2.0 * np.cross(w, speed) + (acceleration_gain(at) @ away[..., None])[..., 0]
