@@ -12,7 +12,6 @@ from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_bending import Bend
 from truenorth.alignment.transfer_filter import Assumed, Linear, Matching, master_aiding
 from truenorth.cli.remedies import reasons_of
-from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.errors.bending import BENDING
 from truenorth.errors.master import TransferModel
@@ -157,9 +156,3 @@ def test_said_to_bend_it_is_aligned_and_the_coupling_found(matching):
     assert t.coupling_sigma[1] < 0.16
     assert abs(t.coupling[1] - 0.5) < 4.0 * t.coupling_sigma[1]
     assert t.summary()["coupling"] == t.coupling.tolist()
-
-
-def test_flexure_needs_the_attitude_of_the_master():
-    slave, master, said, _ = _flight(0.0, seconds=10.0)
-    with pytest.raises(UsageError, match="seen by the master's attitude"):
-        align_transfer(slave, replace(master, C_nb=None), "tactical", flexure=said)

@@ -112,8 +112,14 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
                     H[i, at[AT_OWN] + 3 * j + k] = -turned[i]
     if bends and at[AT_FLEXURE] >= 0:
         for j in range(3):
-            spins = measured[12 + j]
-            roll = times(C, cross((spins * (j == 0), spins * (j == 1), spins * (j == 2)), r))
+            rate, spins = measured[9 + j], measured[12 + j]
+            turn = (rate * (j == 0), rate * (j == 1), rate * (j == 2))
+            roll, inner, outer = (
+                cross((spins * (j == 0), spins * (j == 1), spins * (j == 2)), r),
+                cross(turn, cross(w, r)),
+                cross(w, cross(turn, r)),
+            )
+            roll = times(C, (roll[0] + inner[0] + outer[0], roll[1] + inner[1] + outer[1], roll[2] + inner[2] + outer[2]))
             for i in range(3):
                 H[i, at[AT_FLEXURE] + j] = roll[i]
     into_north(now, H, z)

@@ -247,8 +247,10 @@ def _aligned(
         _, begun = hand_over(slave, master, own, spec, said, noise, position=position, errors=of)
         return run(part, model=own, start=begun, nominal=found.nominal.with_states(own.states))
 
-    bends = [] if flexure is not None else bending_evidence(part, master, track, model, said, of_a_seat_that_bends)
-    seen = [*bends, *_seen(slave, master, errors, said)]
+    seen = _seen(slave, master, errors, said)
+    # A clock that steps leaves what the slave turns, too.
+    if flexure is None and all(item.key != "transfer.clocks_part" for item in seen):
+        seen = bending_evidence(part, master, track, model, said, of_a_seat_that_bends) + seen
     seen += _rivals(part, run, track, model, start, spec, said, of_another_imu, of_another_master)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
     track = as_said_together(track, model, said, what.attitude)

@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 
 SLOWEST = 0.2  # Hz: slower, an arm that is rigid is less than centimetres a second off
 SHARE = 0.2  # of what a slave turns within an octave: less may be a late master, or gyros on axes of their own
+PHASE = 0.2  # rad, of a sigma of the delay: of what is faster nobody knows how much the master should show
 SURELY = 6.0  # standard errors; of three axes and six octaves chance has one beyond in 10^7 logs
 MISSES = 2.0  # sigmas: a delay, an arm or a mounting that is further off is none
 
@@ -78,7 +79,11 @@ def seen_to_bend(
     if raw is None:
         return None
     knots, angles = raw
-    turned = own_angles(slave)
+    w = 2.0 * math.pi * frequencies(len(knots), slave.interval)
+    tau = track.layout.slice_of(DELAY)
+    unsure = 0.0 if tau is None else float(track.sigma[-1, tau][0])
+    whole = own_angles(slave)
+    turned = filtered(whole, np.repeat((w * unsure < PHASE)[:, None], 3, axis=1))
     D, X = (
         np.fft.rfft(np.concatenate([rows, rows[::-1]]), axis=0)
         for rows in (np.stack([np.interp(held, knots, axis) for axis in of.T], axis=1) for of in (angles, turned))
@@ -94,9 +99,9 @@ def seen_to_bend(
                 bent[axis] += 2.0 * power / (2 * len(held)) ** 2  # mean square of rows that are taken there and back
                 slowest = min(slowest, 0.5 * edge)
         edge *= 0.5
-    if not bent.any():
+    # A vibration whose phase nobody knows is in the master's rows at any share, folded to any frequency.
+    if np.sum(bent) <= np.sum(np.var(whole - turned, axis=0)):
         return None
-    w = 2.0 * math.pi * frequencies(len(knots), slave.interval)
     fast = filtered(turned, np.repeat((w > 2.0 * math.pi * slowest)[:, None], 3, axis=1))
     spectrum = np.abs(np.fft.rfft(fast[:, int(np.argmax(bent))])) ** 2
     rate = 2.0 * math.pi * np.fft.rfftfreq(len(fast), slave.interval)
