@@ -119,7 +119,9 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
                 cross(turn, cross(w, r)),
                 cross(w, cross(turn, r)),
             )
-            roll = times(C, (roll[0] + inner[0] + outer[0], roll[1] + inner[1] + outer[1], roll[2] + inner[2] + outer[2]))
+            roll = times(
+                C, (roll[0] + inner[0] + outer[0], roll[1] + inner[1] + outer[1], roll[2] + inner[2] + outer[2])
+            )
             for i in range(3):
                 H[i, at[AT_FLEXURE] + j] = roll[i]
     into_north(now, H, z)

@@ -155,7 +155,7 @@ def _seen_of_body(turned: Array, w: Array, apart: float) -> tuple[Array, Array]:
     seen = np.clip(1.0 - SURELY * floor / np.maximum(smooth, 1e-300), 0.0, 1.0)
     seen[w >= math.pi / apart] = 0.0
     step = math.pi / (w[1] * (len(turned)))  # s
-    return seen, floor * step / (2.0 * len(turned))
+    return seen, np.asarray(floor * step / (2.0 * len(turned)), dtype=np.float64)
 
 
 def relative(slave: ImuRecord, carried: Carried, C_rigid: Array, held: Array) -> tuple[Array, Array] | None:

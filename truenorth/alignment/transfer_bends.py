@@ -29,13 +29,14 @@ from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
 from truenorth.estimate.rivals import effect_of
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.flexure import DECAY, FlexureSpec
-from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.evidence import ANY_EFFECT, Evidence
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
 SLOWEST = 0.2  # Hz: slower, an arm that is rigid is less than centimetres a second off
 SHARE = 0.2  # of what a slave turns within an octave: less may be a late master, or gyros on axes of their own
+NOISE = 10.0  # times the variance of the gyros' own random walk of angle in an octave, folded noise included
 PHASE = 0.2  # rad, of a sigma of the delay: of what is faster nobody knows how much the master should show
 SURELY = 6.0  # standard errors; of three axes and six octaves chance has one beyond in 10^7 logs
 MISSES = 2.0  # sigmas: a delay, an arm or a mounting that is further off is none
@@ -53,11 +54,11 @@ def bending_evidence(
     spec = seen_to_bend(slave, master, track, model, said) if master.C_nb is not None else None
     if spec is None:
         return []
-    figures = {"size": max(spec.sigma), "lasts": spec.correlation_time, "frequency": spec.beta / (2.0 * math.pi)}
+    figures: dict[str, float | str] = {"size": max(spec.sigma), "lasts": spec.correlation_time, "frequency": spec.beta / (2.0 * math.pi)}
     try:
         other = again(spec)
     except (AlignmentError, DataError):  # it does not fit with that either
-        return [contradiction("transfer.bends", "bending", **figures)]
+        return [Evidence("transfer.bends", figures, "unknown", ANY_EFFECT, ("bending",))]
     off = 0.0
     for name in (DELAY, ARM, MOUNTING):
         at, own = track.layout.slice_of(name), other.layout.slice_of(name)
@@ -65,7 +66,7 @@ def bending_evidence(
             sigma = np.maximum(track.sigma[-1, at], 1e-12)
             off = max(off, float(np.max(np.abs(other.sensors[-1, own] - track.sensors[-1, at]) / sigma)))
     if off > MISSES:
-        return [contradiction("transfer.bends", "bending", **figures)]
+        return [Evidence("transfer.bends", figures, "unknown", ANY_EFFECT, ("bending",))]
     return [Evidence("transfer.bends", figures, "known", effect_of(track, other), ("bending",))]
 
 
@@ -94,9 +95,10 @@ def seen_to_bend(
     while edge > SLOWEST:
         octave = (f > 0.5 * edge) & (f <= edge)
         for axis in range(3):
-            power = shown(D[octave, axis], X[octave, axis])
-            if power > 0.0:
-                bent[axis] += 2.0 * power / (2 * len(held)) ** 2  # mean square of rows that are taken there and back
+            # Mean square of rows that are taken there and back; the gyros' own noise is turned by the slave alone, too.
+            power = 2.0 * shown(D[octave, axis], X[octave, axis]) / (2 * len(held)) ** 2
+            if power > NOISE * model.gyro_random_walk**2 / (2.0 * math.pi**2) * (1.0 / edge + 1.0 / f[-1]):
+                bent[axis] += power
                 slowest = min(slowest, 0.5 * edge)
         edge *= 0.5
     # A vibration whose phase nobody knows is in the master's rows at any share, folded to any frequency.
