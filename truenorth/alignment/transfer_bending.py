@@ -181,7 +181,7 @@ def relative(slave: ImuRecord, carried: Carried, C_rigid: Array, held: Array) ->
 
 def frequencies(rows: int, interval: float) -> Array:
     """(F,) Hz, of rows that are taken there and back: without a jump at the ends."""
-    return np.fft.rfftfreq(2 * rows, interval)
+    return np.asarray(np.fft.rfftfreq(2 * rows, interval), dtype=np.float64)
 
 
 def filtered(values: Array, gain: Array) -> Array:

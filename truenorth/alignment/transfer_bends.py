@@ -29,7 +29,7 @@ from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
 from truenorth.estimate.rivals import effect_of
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.flexure import DECAY, FlexureSpec
-from truenorth.state.evidence import ANY_EFFECT, Evidence
+from truenorth.state.evidence import ANY_EFFECT, Evidence, Figure
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -54,7 +54,11 @@ def bending_evidence(
     spec = seen_to_bend(slave, master, track, model, said) if master.C_nb is not None else None
     if spec is None:
         return []
-    figures: dict[str, float | str] = {"size": max(spec.sigma), "lasts": spec.correlation_time, "frequency": spec.beta / (2.0 * math.pi)}
+    figures: dict[str, Figure] = {
+        "size": max(spec.sigma),
+        "lasts": spec.correlation_time,
+        "frequency": spec.beta / (2.0 * math.pi),
+    }
     try:
         other = again(spec)
     except (AlignmentError, DataError):  # it does not fit with that either
