@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from benchmarks.honesty.bending import bending
 from benchmarks.honesty.frame import Case, Outcome, main
 from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.aiding.matching import What
-from truenorth.alignment.transfer import DELAY_WALK, align_transfer
+from truenorth.alignment.transfer import align_transfer
+from truenorth.alignment.transfer_start import DELAY_WALK
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.errors.master import MasterErrors
@@ -275,6 +277,22 @@ CASES += tuple(
     for name, motion in (("ship", ship), ("aircraft", aircraft))
     for grade in ("tactical", "consumer")
     for by in ROWS
+)
+
+BENT: tuple[tuple[str, Any, dict[str, Any]], ...] = (
+    ("a wing of 1 to 8 Hz", aircraft, {"wing": True}),
+    ("a hull of 0.5 to 2 Hz", ship, {"wing": False, "frequencies": (0.5, 2.0), "sizes": (0.05, 0.2)}),
+)
+CASES += tuple(
+    Case(
+        "transfer",
+        f"{name} that bends, {'said' if said else 'unsaid'}, by {ROWS.get(by, by)}",
+        bending(motion, said=said, matching=by, **options),
+        flagged=not said,
+    )
+    for name, motion, options in BENT
+    for said in (True, False)
+    for by in ("both", "velocity", "position+attitude")
 )
 
 if __name__ == "__main__":

@@ -61,7 +61,7 @@ def test_the_recording_agrees_with_its_author(found):
 def test_what_level_driving_does_not_tell_apart_is_named(found):
     """Tilt and accelerometer bias go together on a straight road; so does the mounting where nothing filters the velocity."""
     words = " ".join(found.transfer.open)
-    assert "tilt about north and accelerometer bias x" in words
+    assert "tilt about north, accelerometer bias x and mounting about y" in words
     assert any("left open by this motion" in reason for reason in found.reasons)
 
 
@@ -247,8 +247,8 @@ def test_bad_requests(real):
     slave, master = real
     with pytest.raises(UsageError, match="needs its attitude"):
         align_transfer(slave, replace(master, C_nb=None), matching="attitude")
-    with pytest.raises(UsageError, match="match attitude too"):
-        align_transfer(slave, master, matching="velocity", flexure=FlexureSpec(sigma=(1e-3, 1e-3, 1e-3)))
+    with pytest.raises(UsageError, match="seen by the master's attitude"):
+        align_transfer(slave, replace(master, C_nb=None), flexure=FlexureSpec(sigma=(1e-3, 1e-3, 1e-3)))
     with pytest.raises(UsageError, match="lever_arm is"):
         align_transfer(slave, master, lever_arm=(1.0, 2.0))
     with pytest.raises(UsageError, match="delay_sigma is -1 s"):

@@ -9,7 +9,8 @@ from tests.alignment.test_transfer_axes import ARM, ship
 from tests.alignment.test_transfer_loop import ARCMIN, DEG, DEG_PER_HOUR, SPAN, TACTICAL
 from tests.runs import few_and_all, some
 from truenorth.alignment.transfer import align_transfer
-from truenorth.alignment.transfer_filter import Assumed, Matching, _slopes, master_aiding, transfer_filter
+from truenorth.alignment.transfer_filter import Assumed, Matching, master_aiding, transfer_filter
+from truenorth.alignment.transfer_turns import slopes_at
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel
@@ -137,7 +138,7 @@ def test_a_slope_does_not_see_a_manoeuvre_before_it_begins(flight):
     force[:, :] += 1e-3 * rng.standard_normal(force.shape)
     record = ImuRecord(t, np.zeros_like(force), force, kind="rates")
     at = np.arange(0.24, 3.0, 0.1)  # the last before it at 1.94 s
-    slopes = _slopes(record, at)[:, 3]
+    slopes = slopes_at(record, at)[:, 3]
     assert np.abs(slopes[at < 2.0]).max() < 0.2
     np.testing.assert_allclose(slopes[at > 2.2], 20.0, rtol=0.02)
 

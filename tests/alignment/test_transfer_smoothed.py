@@ -48,10 +48,12 @@ class Tone:
     frequency, size, noise = 6.0, 1.0, 0.0  # rad/s, m/s^2
     corrections = np.zeros(3)
 
-    def __init__(self, slave, track, carried, held, arm):
+    def __init__(self, slave, track, carried, held, arm, bend):
         self.held, self.rng = held, np.random.default_rng(3)
 
-    def held_at(self, shift, half):
+    def held_at(self, shift, half, bent=False):
+        if bent:  # it is rigid
+            return np.zeros((len(self.held), 3))
         seen = (
             self.size
             * np.sinc(self.frequency * half / (2.0 * np.pi)) ** 2

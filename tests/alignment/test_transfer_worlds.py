@@ -12,7 +12,6 @@ from tests.alignment.test_transfer_loop import ARCMIN, DEG, MASTER, TACTICAL
 from truenorth.aiding.aids import Master
 from truenorth.alignment import align
 from truenorth.alignment.transfer import align_transfer
-from truenorth.alignment.transfer_answer import _bent
 from truenorth.alignment.transfer_delay import find_delay, runs_backwards
 from truenorth.alignment.transfer_passes import _colour
 from truenorth.alignment.transfer_verdict import _lasting
@@ -64,17 +63,6 @@ def test_errors_of_the_master_are_no_wander_of_the_gyros(step):
     answer = align_transfer(replace(slave, gyro=slave.gyro + off), master, spec, master_errors=ERRORS)
     found = [item.key for item in answer.evidence if item.key.startswith("rival.")]
     assert found == (["rival.gyro_wanders"] if step else [])
-
-
-def test_an_arm_on_a_seat_that_bends_is_known_as_well_as_the_rates_are_rigid():
-    """Half of the rate's power is the seat's: half of the arm; without flexure nothing is added."""
-    t = 0.01 * np.arange(1, 2001)
-    rates = np.column_stack([0.01 * np.sqrt(2.0) * np.sin(t), 0.0 * t, 0.0 * t])
-    slave = ImuRecord(t, rates, np.tile([0.0, 0.0, 9.8], (2000, 1)))
-    power = math.sqrt(float(np.var(rates[:, 0])) / 2.0)
-    for sigma, expected in ((power / 2.0, 1.5), (0.0, 0.0)):
-        last = SimpleNamespace(slave=slave, model=SimpleNamespace(flexure_sigma=(sigma, 0.0, 0.0), flexure_beta=2.0))
-        assert _bent(last, np.array([0.0, 3.0, 0.0])) == pytest.approx(expected, rel=1e-2)
 
 
 def test_the_first_row_of_a_turn_shows_no_delay():

@@ -4,7 +4,8 @@ The master is late by tau, stands at -r in the slave (r: from master to slave, s
 master axes, ``C_mb true = (I + [mu x]) C_mb assumed``); the slave's seat bends by theta:
 
     velocity   z = v_hat - C_hat (w_hat x r) - v_master
-                 = dv + a (tau + lambda) - a' chi + a'' kappa + C [w x] dr + phi x C (w x r) - C ((eps + M w) x r) - db
+                 = dv + a (tau + lambda) - a' chi + a'' kappa + C [w x] dr + phi x C (w x r) - C ((eps + M w) x r)
+                   + C (dk theta' x r) - db
     attitude   C_hat (C_master C_mb)' = exp(-[z x]),   z = phi - C w_nb tau - C_master mu - C theta - dm
 
 with `a` the *master's* acceleration: the slave's holds that of the arm itself, which would tell a delay from the master's
@@ -12,7 +13,8 @@ smooth motion falsely. The rows are re-timed: they are taken at the stamp less t
 is left of it is linearised. ``b`` and ``m`` are the master's own slow errors of velocity and attitude, east, north, up; `M` holds
 scale factors and misalignments of the gyros: of an arm of 30 m one per cent is an arm of 30.3 m. A filter that the master's
 velocity went through makes it late by ``lambda``, the mean of its impulse response, and flatter by ``chi`` and ``kappa``, parts of
-the variance and the third moment of that (:mod:`truenorth.alignment.transfer_smoothed`).
+the variance and the third moment of that (:mod:`truenorth.alignment.transfer_smoothed`). Where the seat bends, `w` is that of the
+chord of the arm, ``w - (1 - k) theta'`` (:mod:`truenorth.errors.bending`).
 
 Sources: Xia Jiahe et al., "Study on transfer alignment algorithm considering space-time difference", Navigation Positioning
 and Timing 3 (2016), eq. 6-9, corrected: a zero column is missing in its (9); the sign of tau in its (8) is that of (9) when
@@ -42,6 +44,7 @@ from truenorth.aiding.row import (
     Row,
     beyond_noise,
     by_axes,
+    idle_part,
     lag_now,
     row,
     state_of,
@@ -103,14 +106,15 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     Then the columns of delay and arm (n, 3 x 4, by rows), and by what ``C [w x]`` is to be multiplied (3 x 4) to be what of the
     instant's noise is in them, or NaN (:mod:`truenorth.alignment.transfer_columns`). Last the
     derivatives of velocity of which a filter makes it flatter, m/s^3 and m/s^4, n, and how much before its stamp the row is taken
-    already since a filter made it late, s; or NaN.
+    already since a filter made it late, s; or NaN. At the very end how fast the seat bends, rad/s, body axes, or NaN.
 
     Acceleration and attitude (quaternion) are of n. Without either, the spin is that of the instant. The rate is what its gyros
     say, in body axes, without what vibrates (:mod:`truenorth.alignment.transfer_shaken`); else that of the instant.
 
     Columns of the arm are of a rate with another noise than that of `z`: one that is in both (4 cm/s of an industrial gyro at
     37 m) is taken for an arm that is too long, .6 m of it. Its own figures: the variance of a component of that rate; and 1 where
-    the slave's spin is measured, rad/s^2, 2 where the acceleration is not known (:mod:`truenorth.alignment.transfer_turns`).
+    the slave's spin is measured, rad/s^2, 2 where the acceleration is not known (:mod:`truenorth.alignment.transfer_turns`); the
+    coupling of a seat that bends (3).
     """
     if np.isnan(measured[0]):
         return
@@ -123,6 +127,11 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         other = w
     off = by_axes(assumed, at[AT_OWN], w)
     w = (w[0] - off[0], w[1] - off[1], w[2] - off[2])
+    bends = not np.isnan(measured[44])
+    if bends:
+        idle = idle_part(figures, OWN + 2, assumed, at[AT_FLEXURE], measured, 44)
+        w = (w[0] - idle[0], w[1] - idle[1], w[2] - idle[2])
+        other = (other[0] - idle[0], other[1] - idle[1], other[2] - idle[2])
     w_eb = (w[0] - still[0], w[1] - still[1], w[2] - still[2])
     push = (0.0, 0.0, 0.0)
     if not np.isnan(measured[3]) and figures[OWN + 1] == 0.0:
@@ -157,6 +166,12 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
                 a += max(0, j - 1)
                 for i in range(3):
                     H[i, a] = measured[13 + 4 * i + j] - m[i]
+    if bends and at[AT_FLEXURE] >= 0:
+        for j in range(3):
+            rate = measured[44 + j]
+            m = into_n(now, times(C, cross((rate * (j == 0), rate * (j == 1), rate * (j == 2)), r)))
+            for i in range(3):
+                H[i, at[AT_FLEXURE] + j] = m[i]
     if at[AT_FILTER] >= 0:
         a, late = at[AT_FILTER], into_n(now, push)
         for i in range(3):
@@ -253,7 +268,11 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 
 MASTER_VELOCITY = Row(
-    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9, "filter": 3}, width=44, instant=True
+    "master velocity",
+    _velocity,
+    {"lever arm": 3, "bias": 3, "lag": 1, "own": 9, "filter": 3, "flexure": 3},
+    width=47,
+    instant=True,
 )
 MASTER_ATTITUDE = Row(
     "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=10, instant=True, unit="rad"

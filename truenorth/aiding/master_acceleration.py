@@ -10,6 +10,8 @@ delay, w' and f_b' come with the row, taken over some tenths of a second: of a f
 taken for knowledge. For the same reason the arm should be *considered* here, not estimated: what is smoothed is not quite what
 acts. The slave's force is a mean over six samples; what noise and vibration leave of it counts in the noise of the row.
 
+Where the seat bends, `w` and `w'` of the arm are those of its chord (:mod:`truenorth.errors.bending`).
+
 Source: Xia Jiahe et al., "Study on transfer alignment algorithm considering space-time difference", Navigation Positioning
 and Timing 3 (2016), eq. 4, for a rigid body; its transformation on the right is the inverse of what its words say.
 """
@@ -26,12 +28,14 @@ from truenorth.aiding.row import (
     ARM,
     AT_ARM,
     AT_BIAS,
+    AT_FLEXURE,
     AT_LAG,
     AT_OWN,
     AT_SCALE,
     OWN,
     Row,
     by_axes,
+    idle_part,
     lag_now,
     row,
     with_state,
@@ -47,7 +51,8 @@ _PHI, _BA = PHI.start, BA.start
 def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     """Measured: the master's specific force, east, north, up; the slave's w' and f_b', NaN where its log ends.
 
-    Its own figures: the force at rest besides which the accelerometers' axes act.
+    Behind these how fast the seat bends, rad/s, and how fast that changes, rad/s^2, body axes, or NaN. Its own figures: the force
+    at rest besides which the accelerometers' axes act; the coupling of a seat that bends (3).
     """
     if np.isnan(measured[0]):
         return
@@ -66,6 +71,12 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
     f = (f[0] - of_f[0], f[1] - of_f[1], f[2] - of_f[2])
     w = (w[0] - of_w[0], w[1] - of_w[1], w[2] - of_w[2])
     spin = (spin[0] - of_spin[0], spin[1] - of_spin[1], spin[2] - of_spin[2])
+    bends = not np.isnan(measured[9])
+    if bends:
+        idle = idle_part(figures, OWN + 3, assumed, at[AT_FLEXURE], measured, 9)
+        slower = idle_part(figures, OWN + 3, assumed, at[AT_FLEXURE], measured, 12)
+        w = (w[0] - idle[0], w[1] - idle[1], w[2] - idle[2])
+        spin = (spin[0] - slower[0], spin[1] - slower[1], spin[2] - slower[2])
     swing, roll = cross(w, cross(w, r)), cross(spin, r)
     at_master = (f[0] - swing[0] - roll[0], f[1] - swing[1] - roll[1], f[2] - swing[2] - roll[2])
     turn = cross(w, at_master)
@@ -99,6 +110,20 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
                 )
                 for i in range(3):
                     H[i, at[AT_OWN] + 3 * j + k] = -turned[i]
+    if bends and at[AT_FLEXURE] >= 0:
+        for j in range(3):
+            rate, spins = measured[9 + j], measured[12 + j]
+            turn = (rate * (j == 0), rate * (j == 1), rate * (j == 2))
+            roll, inner, outer = (
+                cross((spins * (j == 0), spins * (j == 1), spins * (j == 2)), r),
+                cross(turn, cross(w, r)),
+                cross(w, cross(turn, r)),
+            )
+            roll = times(
+                C, (roll[0] + inner[0] + outer[0], roll[1] + inner[1] + outer[1], roll[2] + inner[2] + outer[2])
+            )
+            for i in range(3):
+                H[i, at[AT_FLEXURE] + j] = roll[i]
     into_north(now, H, z)
     if at[AT_BIAS] >= 0:  # an error of the master's attitude stands along east, north, up, as what it said
         m, of = (measured[0], measured[1], measured[2]), at[AT_BIAS]
@@ -112,8 +137,8 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
 MASTER_ACCELERATION = Row(
     "master acceleration",
     _acceleration,
-    {"lever arm": 3, "bias": 3, "lag": 1, "scale": 9, "own": 9},
-    width=9,
+    {"lever arm": 3, "bias": 3, "lag": 1, "scale": 9, "own": 9, "flexure": 3},
+    width=15,
     instant=True,
     unit="m/s^2",
 )

@@ -115,6 +115,13 @@ def by_axes(assumed: Any, at: int, x: Any) -> Any:
 
 
 @compiled
+def idle_part(figures: Any, first: int, assumed: Any, at: int, measured: Any, behind: int) -> Any:
+    """What of three values of a seat that bends its chord does not follow, by the coupling of each axis; a tuple."""
+    k = with_state(figures, first, assumed, at)
+    return (1.0 - k[0]) * measured[behind], (1.0 - k[1]) * measured[behind + 1], (1.0 - k[2]) * measured[behind + 2]
+
+
+@compiled
 def state_of(assumed: Any, at: int) -> float:
     """What is assumed in a single state, 0 where there is none."""
     value = 0.0

@@ -20,17 +20,16 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged, noise_in
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer
 from truenorth.alignment.transfer_axes import same_axes, slave_axes
+from truenorth.alignment.transfer_bends import bending_evidence
 from truenorth.alignment.transfer_drifts import delay_evidence, drifting_rivals
 from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, Matching, transfer_filter
-from truenorth.alignment.transfer_passes import found_in_passes
+from truenorth.alignment.transfer_passes import Found, found_in_passes
 from truenorth.alignment.transfer_shaken import shaken_evidence
-from truenorth.alignment.transfer_smoothed import filter_sigmas
-from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
+from truenorth.alignment.transfer_start import common_clock, hand_over, model_for, parted_clocks
 from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.group import Group
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
 from truenorth.estimate.poorer import BIASES, SLOW, poorer_rivals, poorer_tracks
@@ -57,7 +56,6 @@ Array = NDArray[np.float64]
 LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m, of an arm that is given; s, rad
 # Of an IMU of whose place on the master's vehicle nothing is said.
 ON_MASTER = Mounting(lever_arm_sigma=VEHICLE_ARM, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
-DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
 SHORTEST = 5.0  # s
 USUAL, POORER = "industrial", "consumer"  # presets of a slave of which nothing is said
 RIVAL_DELAY = 0.2  # s, one sigma of a master's delay where gyros may be late
@@ -146,8 +144,8 @@ def align_transfer(
     arm, lever_arm_sigma = _arm(lever_arm, lever_arm_sigma)
     angles = _three(mounting, "mounting", "radians: heading, pitch, roll of the slave seen from the master")
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
-    if flexure is not None and not what.attitude:
-        raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
+    if flexure is not None and master.C_nb is None:
+        raise UsageError("flexure is seen by the master's attitude, which its log does not hold; leave it out")
     spec = imu_spec(USUAL if imu is None else imu)
     where = f"specification {spec.name}"
     record = slave
@@ -211,39 +209,53 @@ def _aligned(
     tell: Callable[[str], None],
 ) -> Alignment:
     """The alignment with what is said of clocks, arm and seat, by a specification and where that comes from."""
-    model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
-    noise, fitted = first
-    handed = partial(hand_over, slave, master, model, spec, said, position=position)
-    found = found_in_passes(slave, master, model, handed, said, noise, fitted, what.kind, tell)
+    axes = slave_axes(slave, master, spec, said, what)
+
+    def through_passes(
+        flexure: FlexureSpec | None,
+    ) -> tuple[TransferModel, ImuRecord, Start, Found, Callable[..., Track]]:
+        """Model, slave and start, what the passes found, and the filter about it, of a seat that bends so."""
+        model = model_for(spec, said, what, flexure, errors, axes)
+        handed = partial(hand_over, slave, master, model, spec, said, position=position, errors=errors)
+        found = found_in_passes(slave, master, model, handed, said, *first, what.kind, tell)
+        tell("aligning")
+        part, start = handed(found.noise)
+        _check_length(part, slave.source)
+        along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
+        run = partial(along, master=master, matching=Matching(*found.noise, what.kind, limit("master's gate")))
+        return model, part, start, found, run
+
+    def of_a_seat_that_bends(flexure: FlexureSpec) -> Track:
+        model, part, start, _, run = through_passes(flexure)
+        return run(part, model=model, start=start)
+
+    model, part, start, found, run = through_passes(flexure)
     noise = found.noise
-    tell("aligning")
-    part, start = handed(noise)
-    _check_length(part, slave.source)
-    along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
-    run = partial(along, master=master, matching=Matching(*noise, what.kind, limit("master's gate")))
     track = run(part, model=model, start=start)
 
     def of_another_imu(other: ImuSpec) -> Track:
         """The same measurements of a slave by another specification, with the master's errors estimated."""
         axes = same_axes(other, said, model.groups)
-        own = replace(_model(other, said, what, flexure, errors, axes), considered=False)
-        _, begun = hand_over(slave, master, own, other, said, noise, position=position)
+        own = replace(model_for(other, said, what, flexure, errors, axes), considered=False)
+        _, begun = hand_over(slave, master, own, other, said, noise, position=position, errors=errors)
         return run(part, model=own, start=begun)
 
     def of_another_master(drift: float) -> Track:
         """The same of a master whose heading drifts by so much, rad; its errors are estimated."""
         of = replace(errors, heading_drift=drift)
-        own = replace(_model(spec, said, what, flexure, of, model.axes), considered=False)
-        _, begun = hand_over(slave, master, own, spec, said, noise, position=position)
+        own = replace(model_for(spec, said, what, flexure, of, model.axes), considered=False)
+        _, begun = hand_over(slave, master, own, spec, said, noise, position=position, errors=of)
         return run(part, model=own, start=begun, nominal=found.nominal.with_states(own.states))
 
     seen = _seen(slave, master, errors, said)
+    # A clock that steps leaves what the slave turns, too.
+    if flexure is None and all(item.key != "transfer.clocks_part" for item in seen):
+        seen = bending_evidence(part, master, track, model, said, of_a_seat_that_bends) + seen
     seen += _rivals(part, run, track, model, start, spec, said, of_another_imu, of_another_master)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
     track = as_said_together(track, model, said, what.attitude)
-    carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
-    least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
-    last = LastPass(part, master, model, said, start, what, noise, track, carried, least, found.left)
+    least = FIRST_NOISE[what.kind] if first[1][0] else noise[0]
+    last = LastPass(part, master, model, said, start, what, noise, track, errors, least, found.left)
     return assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
 
 
@@ -332,30 +344,6 @@ def _known_as_well_as(position: Position, answer: Alignment) -> Alignment:
     """The answer with the uncertainty of a place that the caller gave."""
     sigmas = {"horizontal_sigma": position.horizontal_sigma, "vertical_sigma": position.vertical_sigma}
     return replace(answer, position=replace(answer.position, **sigmas))
-
-
-def _model(
-    spec: ImuSpec,
-    assumed: Assumed,
-    what: Matched,
-    flexure: FlexureSpec | None,
-    errors: MasterErrors,
-    axes: tuple[Group, ...],
-) -> TransferModel:
-    """States for what is matched; of the master's errors, those that act on it."""
-    of_rows = errors
-    if what.translation != "velocity":
-        of_rows = replace(of_rows, velocity=0.0, velocity_drift=0.0)
-    if not what.attitude and what.translation != "acceleration":
-        of_rows = replace(of_rows, attitude_drift=0.0, heading_drift=None, level=0.0, heading=0.0)
-    bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
-    model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, of_rows, axes)
-    if what.translation == "position":  # place and velocity are against a master whose own velocity error wanders
-        walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
-        model = replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))
-    if what.translation == "velocity":
-        model = replace(model, filter=filter_sigmas(errors.filter, what.attitude))
-    return replace(model, arm_considered=what.translation == "acceleration")
 
 
 def _seen(slave: ImuRecord, master: MasterRecord, errors: MasterErrors, said: Assumed) -> list[Evidence]:

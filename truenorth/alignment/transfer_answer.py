@@ -28,6 +28,7 @@ from truenorth.core.attitude import (
 )
 from truenorth.core.position import Position
 from truenorth.errors.axes import proper_bias, standing
+from truenorth.errors.bending import BENDING
 from truenorth.errors.master import ARM, ATTITUDE_ERROR, DELAY, MOUNTING, VELOCITY_ERROR, MasterErrors, TransferModel
 from truenorth.estimate.memory import REJECTED, REOPENED, USED
 from truenorth.records import ImuRecord, MasterRecord
@@ -38,7 +39,7 @@ from truenorth.state.layout import BA, BG, DP, DV, PHI
 from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
-from truenorth.strapdown.increments import increments, interval_lengths
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
@@ -86,10 +87,26 @@ class LastPass(NamedTuple):
     what: Matched
     noise: tuple[float, float]  # of translation and attitude of the master's rows
     track: Track
-    # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
-    carried: float = 0.0
+    errors: MasterErrors = (
+        MasterErrors()
+    )  # of the master, all that is said; the model has those that its rows bear as states
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
     left: float = 0.0  # sigmas that the last pass that sought the motion has still moved it by
+
+    @property
+    def carried(self) -> float:
+        """Error of the master's velocity that its positions bear, and the slave's velocity with them, m/s."""
+        return math.hypot(self.errors.velocity, self.errors.velocity_drift) if self.what.kind == "position" else 0.0
+
+    @property
+    def considered(self) -> bool:
+        """Whether what the master's errors do to the rows that are matched is in sigma.
+
+        Of positions that is how fast their error changes: a constant error of a velocity goes into the slave's velocity, its drift
+        counts as noise of the accelerometers (`accel_random_walk`); an attitude's error does not act on them.
+        """
+        borne = any(self.model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR))
+        return borne or self.carried > 0.0
 
 
 def assemble_transfer(
@@ -138,9 +155,9 @@ def assemble_transfer(
 
 
 def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Transfer:
-    _, master, model, assumed, _, what, noise, track, carried, *_ = last
+    _, master, model, assumed, _, what, noise, track, errors, *_ = last
     sigma, aux, C_mb = track.sigma[-1], track.sensors[-1], axes_along(track, assumed)[-1]
-    tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
+    tau, arm, mount, coupling = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING, BENDING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
     silences = tuple(
         f"the master is silent for {master.steps[k]:.1f} s after {master.time[k - 1]:.1f} s" for k in silent[:3]
@@ -155,7 +172,7 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
         delay_sigma=0.0 if tau is None else float(sigma[tau][0]),
         delay_prior=assumed.delay_sigma,
         lever_arm=assumed.lever_arm + (0.0 if arm is None else aux[arm]),
-        lever_arm_sigma=np.zeros(3) if arm is None else np.hypot(sigma[arm], _bent(last, assumed.lever_arm + aux[arm])),
+        lever_arm_sigma=np.zeros(3) if arm is None else sigma[arm],
         lever_arm_prior=np.full(3, assumed.lever_arm_sigma),
         mounting=_signed(np.array(euler_from_dcm(C_mb))),
         mounting_sigma=sigma_of_mounting(track.P[-1], mount, C_mb),
@@ -165,9 +182,9 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
         used=int(np.sum(np.any((verdict == USED) | (verdict == REOPENED), axis=1))),
         rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
-        P=_placed(P, Position(0.0), carried),
-        relative_sigma=_relative(track, model),
-        considered=any(model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR)),
+        P=_placed(P, Position(0.0), last.carried),
+        relative_sigma=_relative(track, model, errors),
+        considered=last.considered,
         jumps=_jumps(track, said, what),
         open=_open(last),
         notes=(*notes, *silences),
@@ -175,21 +192,12 @@ def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Trans
         acceleration_noise=fitted["acceleration"],
         residuals=track.residuals,
         course=_course(model, assumed, track),
+        coupling=None if coupling is None else np.asarray(model.coupling) + aux[coupling],
+        coupling_sigma=None if coupling is None else sigma[coupling],
         known=known,
         force=standing(assumed.C_mb),
         acting_bias=track.sensors[-1, BA],
     )
-
-
-def _bent(last: LastPass, arm: Array) -> float:
-    """How much of an arm is false, m: its seat bends, which its gyros show, but its end does not move as much.
-
-    Of the rates with which the arm was found, a share ``s^2 / w^2`` is the seat's, s the root mean square of its own rate.
-    """
-    bends = np.asarray(last.model.flexure_sigma) * last.model.flexure_beta
-    rates = increments(last.slave)[0] / interval_lengths(last.slave)[:, None]
-    whole = float(np.sum(np.var(rates, axis=0)))
-    return float(np.linalg.norm(arm)) * min(1.0, float(bends @ bends) / max(whole, 1e-30))
 
 
 def _course(model: TransferModel, assumed: Assumed, track: Track) -> Relation:
@@ -209,14 +217,18 @@ def _course(model: TransferModel, assumed: Assumed, track: Track) -> Relation:
     )
 
 
-def _relative(track: Track, model: TransferModel) -> Array:
-    """(3,) sigmas of heading, pitch and roll against the master's own solution: ``phi - m``."""
+def _relative(track: Track, model: TransferModel, errors: MasterErrors) -> Array:
+    """(3,) sigmas of heading, pitch and roll against the master's own solution: ``phi - m``.
+
+    Where the master's attitude is not matched, its error is none of the slave's, and is added to it.
+    """
     P, at = track.P[-1], model.slice_of(ATTITUDE_ERROR)
     J = np.zeros((3, model.states))
     J[:, PHI] = np.eye(3)
     if at is not None:
         J[:, at] = -np.eye(3)
-    return euler_sigma(track.C_nb[-1], J @ P @ J.T)
+    apart = np.zeros(3) if at is not None else errors.attitude
+    return euler_sigma(track.C_nb[-1], J @ P @ J.T + np.diag(apart**2))
 
 
 def _placed(P: Array, place: Position, carried: float) -> Array:
@@ -253,9 +265,8 @@ def _open(last: LastPass) -> tuple[str, ...]:
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:
         return ()
-    model = replace(
-        model, master=MasterErrors(), axes=(), filter=(0.0, 0.0, 0.0)
-    )  # their groups stand behind all others
+    whole = model.names
+    model = replace(model, master=MasterErrors(), axes=(), filter=(0.0, 0.0, 0.0), coupling_sigma=0.0)
     middle, at, T = _states(slave, track, k)
     speed = float(np.max(np.linalg.norm(track.v_n, axis=1)))
     P0 = model.prior(
@@ -282,7 +293,8 @@ def _open(last: LastPass) -> tuple[str, ...]:
     words = [str(group) for group in said.hardly if len(group.states) > 1 and not quiet.issuperset(group.states)]
     if unseen:
         words.append(f"not seen at all: {', '.join(unseen)}")
-    return (*words, *_tied(names, track.P[-1][np.ix_(seen, seen)], quiet | set(unseen)))
+    own = [whole.index(model.names[i]) for i in seen]
+    return (*words, *_tied(names, track.P[-1][np.ix_(own, own)], quiet | set(unseen)))
 
 
 def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:

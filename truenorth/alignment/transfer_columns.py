@@ -19,6 +19,8 @@ Columns are means over `h` before and after a row with weights of a triangle, bo
 
     delay   mean of C f - corrections - C'' r,      arm   mean of C'
 
+Where a seat bends, and its end by another coupling than is assumed, columns have as much of its motion as noise.
+
 `h` is that with which the calibrated columns know most. What the gyros' noise in such a mean has in common with that of the rate in
 the row itself is taken off.
 
@@ -34,6 +36,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.transfer_bending import Bend
 from truenorth.alignment.transfer_nominal import Carried
 from truenorth.alignment.transfer_turns import HALVES, INSTANT
 from truenorth.core.attitude import dcm_from_quaternion, skew
@@ -71,6 +74,7 @@ def columns_along(
     assumed: tuple[Array, float, float],
     sigma: float,
     calibrated: bool,
+    bend: Bend | None = None,
 ) -> Columns | None:
     """Columns about the motion that a pass has found; None where those of the instant have little noise.
 
@@ -86,6 +90,8 @@ def columns_along(
         Noise of a row.
     calibrated : bool
         Whether the pass was made with such columns: then none of what it knows is noise.
+    bend : Bend, optional
+        How its seat bends.
     """
     arm, arm_sigma, delay_sigma = assumed
     P, at = track.P[-1], track.layout.slice_of(ARM)
@@ -96,25 +102,28 @@ def columns_along(
     known = np.linalg.inv(T @ P @ T.T / np.outer(prior, prior))
     step, walk, push = slave.interval, model.gyro_random_walk**2, model.accel_random_walk**2
 
-    def noise(rate: float, spin: float, force: float) -> Array:
+    means = Means(slave, track, carried, held, arm, bend)
+
+    def noise(rate: float, spin: float, force: float, half: float) -> Array:
         """(n,) information of columns of noise on delay and arm, by that before the log; variances of a component."""
-        of = len(track) / sigma**2 * np.array([2.0 * reach * spin + 3.0 * force, *[2.0 * rate] * 3])
+        push, turn = means.unsure(half)
+        of = len(track) / sigma**2 * np.array([2.0 * reach * spin + 3.0 * force + push, *[2.0 * rate + turn] * 3])
         return np.asarray(of[which] * prior**2)
 
-    of_instant = noise(OTHER_NOISE * walk / step, SPIN_NOISE * walk / step**3, FORCE_NOISE * push / step)
+    of_instant = noise(OTHER_NOISE * walk / step, SPIN_NOISE * walk / step**3, FORCE_NOISE * push / step, step)
     known = _at_least_one(known if calibrated else known - np.diag(of_instant))
     halves = [half for half in HALVES if half > 2.0 * step]
     false = np.linalg.eigvalsh(np.sqrt(of_instant)[:, None] * np.linalg.inv(known) * np.sqrt(of_instant))
     if np.max(false, initial=0.0) <= SMALL or not halves:
         return None
-    means, best, most = Means(slave, track, carried, held, arm), None, -np.inf
+    best, most = None, -np.inf
     for half in halves:
         force, of, common = means.over(half)
         usable = np.isfinite(common)
         H = of[usable][:, :, which].reshape(-1, len(which)) * prior / sigma
         # Of weights of a triangle without what the instant has in common with them, and of their slope.
         own, tied = 2.0 / (3.0 * half), step / (INSTANT * half)
-        N = noise(walk * (own - tied / half) / (1.0 - tied) ** 2, 2.0 * walk / half**3, push * own)
+        N = noise(walk * (own - tied / half) / (1.0 - tied) ** 2, 2.0 * walk / half**3, push * own, half)
         A, knows = _calibrated(H.T @ H, N)
         if knows > most:
             whole = np.zeros((4, 4))
@@ -156,17 +165,23 @@ def _calibrated(G: Array, N: Array) -> tuple[Array, float]:
 class Means:
     """The master's acceleration and the columns of the arm as means about its rows, of the motion that a pass has found."""
 
-    def __init__(self, slave: ImuRecord, track: Track, carried: Carried, held: Array, arm: Array) -> None:
+    def __init__(
+        self, slave: ImuRecord, track: Track, carried: Carried, held: Array, arm: Array, bend: Bend | None = None
+    ) -> None:
         steps = interval_lengths(slave)
         self.slave, self.held = slave, held
         self.knots = np.append(slave.time[0] - steps[0], slave.time)
         C = dcm_from_quaternion(carried.q)  # in the axes of the body at the beginning
         middle = 0.5 * (C[1:] + C[:-1])
         velocity = _summed((middle @ _forces(slave, track, steps)[..., None])[..., 0])
-        self.turned = _summed(middle * steps[:, None, None])
-        self.moved = _summed(0.5 * (velocity[1:] + velocity[:-1]) * steps[:, None]) - C @ arm  # of the master
+        chord = C if bend is None else bend.turned(C)  # of the arm
+        self.turned = _summed(0.5 * (chord[1:] + chord[:-1]) * steps[:, None, None])
+        self.moved = _summed(0.5 * (velocity[1:] + velocity[:-1]) * steps[:, None]) - chord @ arm  # of the master
         row = np.clip(np.searchsorted(track.time, held), 0, len(track) - 1)
         lat, alt, v = track.position[row, 0], track.position[row, 2], track.v_n[row]
+        self.bent: Array | None = None
+        if bend is not None:  # where it holds the end, and how the chord turns, by as much as the coupling may be off
+            self.bent, self.chord = np.cross(bend.unsure, arm), _summed(bend.unsure[1:] * steps[:, None])
         self.into_n = carried.C_n0[row]
         self.of_earth = skew(earth_rate_n(lat)) @ carried.C_nb[row]
         self.corrections = gravity_n(lat, alt) - np.cross(2.0 * earth_rate_n(lat) + transport_rate_n(lat, alt, v), v)
@@ -183,11 +198,25 @@ class Means:
         common = common / (1.0 - common)
         return push, np.concatenate([push[..., None], of_arm], axis=2), common
 
-    def held_at(self, shift: float, half: float) -> Array:
-        """(M, 3) the master's specific force so long after its rows, n, means; NaN beyond the log."""
-        there = self.held + shift
+    def unsure(self, half: float) -> tuple[float, float]:
+        """Mean squares of what a coupling that is off puts into acceleration, m^2/s^4, and into the columns of the arm, 1/s^2."""
+        if self.bent is None:
+            return 0.0, 0.0
+        span = np.full(len(self.held), half)
+        of = (self._slope(values, span) for values in (self.bent, self.chord))
+        push, turn = (float(np.mean(np.sum(values**2, axis=1))) for values in of)
+        return push, turn
+
+    def held_at(self, shift: float, half: float, bent: bool = False) -> Array:
+        """(M, 3) the master's specific force so long after its rows, n, means; NaN beyond the log.
+
+        Or (`bent`) what a coupling that is off makes of it.
+        """
+        there, whole = self.held + shift, self.bent if bent else self.moved
+        if whole is None:
+            return np.zeros((len(there), 3))
         span = np.where((there - half >= self.knots[0]) & (there + half <= self.knots[-1]), half, np.nan)
-        force = self._slope(self.moved, span, shift)
+        force = self._slope(whole, span, shift)
         return np.asarray((self.into_n @ force[..., None])[..., 0])
 
     def _slope(self, whole: Array, span: Array, after: float = 0.0) -> Array:

@@ -15,13 +15,26 @@ from truenorth.aiding.master_position import MASTER_POSITION
 from truenorth.aiding.matching import Translation
 from truenorth.aiding.row import Row
 from truenorth.aiding.source import Aiding, Role
+from truenorth.alignment.transfer_bending import Bend
 from truenorth.alignment.transfer_columns import OTHER_NOISE, Columns
 from truenorth.alignment.transfer_nominal import Nominal
 from truenorth.alignment.transfer_rows import stamped_as_the_master
-from truenorth.alignment.transfer_turns import KNOWN, MEAN, push_of, shaken, spins_at, turns_at
+from truenorth.alignment.transfer_turns import (
+    HALVES,
+    KNOWN,
+    MEAN,
+    push_of,
+    rates_at,
+    shaken,
+    slopes_at,
+    spins_at,
+    spins_of,
+    turns_at,
+)
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.core.errors import DataError
+from truenorth.errors.bending import BENDING
 from truenorth.errors.group import Group
 from truenorth.errors.master import (
     ARM,
@@ -41,13 +54,10 @@ from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI
 from truenorth.state.state import Start
 from truenorth.state.track import Track
-from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
 LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body turn little in it
-SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
-SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
 
 
 @dataclass(frozen=True)
@@ -93,6 +103,7 @@ class Linear:
     flatter: Array | None = None  # (M, 6) what a filter of the master's velocity makes flatter
     late: float = 0.0  # s: by which a filter makes velocities later than `delay`
     C_late: Array | None = None  # the slave's when these held; `C_nb` where None
+    bend: Bend | None = None  # how its seat bends
 
 
 def transfer_filter(
@@ -182,6 +193,7 @@ def master_aiding(
     held = stamps - (0.0 if linear is None else linear.delay)  # when they held, as far as is known
     of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
     own: tuple[float, ...] = (OTHER_NOISE * of_sample, KNOWN)
+    bend = None if linear is None or slave is None else linear.bend
     if master.lat is not None and master.lon is not None and master.alt is not None:
         place = np.column_stack([master.lat, master.lon, master.alt])
     if place is not None and kind != "position":
@@ -193,12 +205,17 @@ def master_aiding(
     measured = _translation(master, kind, place, linear) if np.isfinite(matching.sigma) else None
     if measured is not None and slave is not None:
         if kind == "acceleration":
-            measured[:, 3:] = _slopes(slave, held)
+            measured[:, 3:9] = slopes_at(slave if bend is None else bend.chord(slave, assumed.lever_arm), held)
+            if bend is not None:
+                measured[:, 9:12], measured[:, 12:15] = bend.at(held, 1), bend.at(held, 2)
         elif kind == "velocity":
             own = (own[0], _add_turns(measured, slave, master, model, assumed, held - late, linear))
         elif (reach := _reach(assumed)) > 0.0:
-            turns, of_turn = turns_at(slave, held, model.gyro_random_walk, matching.sigma / reach)
-            measured[:, 3:], own = np.nan if turns is None else turns, (of_turn,)
+            seat = slave if bend is None else bend.chord(slave)
+            turns, of_turn = turns_at(seat, held, model.gyro_random_walk, matching.sigma / reach)
+            measured[:, 3:6], own = np.nan if turns is None else turns, (of_turn,)
+            if bend is not None:
+                measured[:, 6:9] = bend.at(held)
     has_C = master.C_nb is not None and np.isfinite(matching.attitude_sigma)
     known_C = np.isfinite(master.C_nb).all(axis=(1, 2)) if has_C and master.C_nb is not None else np.zeros(count, bool)
     if measured is not None:
@@ -208,7 +225,9 @@ def master_aiding(
         roles |= {"own": GYRO_AXES} if kind != "position" else {}
         roles |= {"filter": FILTER} if kind == "velocity" else {}
         roles |= {"scale": ACCEL_AXES} if kind == "acceleration" else {}
+        roles |= {"flexure": BENDING} if bend is not None else {}
         at_rest = groups[ACCEL_AXES].figures if ACCEL_AXES in groups else (0.0, 0.0, 0.0)
+        figures = (*(at_rest if kind == "acceleration" else own), *model.coupling)
         found.append(
             Aiding(
                 row.name,
@@ -219,7 +238,7 @@ def master_aiding(
                 assumed.lever_arm,
                 states=_states(groups, roles if error is None else {**roles, "bias": error}),
                 gate=matching.gate,
-                figures=at_rest if kind == "acceleration" else own,
+                figures=figures,
                 retimed=True,
                 patience=patience if opens is not None else 0,
                 opens=opens,
@@ -234,7 +253,10 @@ def master_aiding(
         )
         of_turn = 0.0
         if slave is not None:
-            turns, of_turn = turns_at(slave, held, model.gyro_random_walk, matching.attitude_sigma)
+            body = slave if bend is None else bend.without(slave)  # a delay is one of what the master turns
+            turns, of_turn = turns_at(body, held, model.gyro_random_walk, matching.attitude_sigma)
+            if turns is None and bend is not None:
+                turns = rates_at(body, held)
             measured[:, 7:] = np.nan if turns is None else turns
         roles = {"lag": DELAY, "mounting": MOUNTING, "flexure": FLEXURE, "bias": ATTITUDE_ERROR}
         found.append(
@@ -276,19 +298,30 @@ def _add_turns(
     columns = None if linear is None else linear.columns
     assert master.v_n is not None
     own = bool(np.isfinite(measured[:, 3:6]).any())  # the master says its acceleration
+    bend = None if linear is None else linear.bend
     rates = shaken(slave, held, walk, min(assumed.delay_sigma, phase))
+    if bend is not None:
+        # Of the same samples as what bends: the rule of the instant makes more of what is faster, and k would be too small.
+        measured[:, 10:13], measured[:, 44:47] = bend.rates(slave, held), bend.at(held, 1)
     if columns is not None and rates is None and not own:
         measured[:, 3:6] = columns.push
         measured[:, 13:25], measured[:, 25:37] = columns.of.reshape(-1, 12), columns.common.reshape(-1, 12)
         return KNOWN
     pushed = KNOWN
     if not own:
-        spins, pushed = spins_at(slave, held, walk, _reach(assumed), push_of(master.time, master.v_n))
+        seat = slave if bend is None else bend.chord(slave)
+        spins, pushed = spins_at(seat, held, walk, _reach(assumed), push_of(master.time, master.v_n))
+        if spins is None and bend is not None and pushed == KNOWN:  # that of the instant is the slave's own
+            spins, pushed = spins_of(seat, held, HALVES[0]), MEAN
         measured[:, 3:6] = np.nan if spins is None else spins
     if rates is not None:
         measured[:, 10:13] = rates.slow
+        own_spin = rates.spin
+        if bend is not None:
+            bent = rates.alike(np.diff(bend.angles, axis=0) / np.diff(bend.knots)[:, None])
+            measured[:, 44:47], own_spin = bent.slow, own_spin - (1.0 - bend.coupling) * bent.spin
         if not own and pushed == KNOWN:
-            measured[:, 3:6], pushed = rates.spin, MEAN
+            measured[:, 3:6], pushed = own_spin, MEAN
     return pushed
 
 
@@ -306,12 +339,12 @@ TRANSLATIONS = tuple(row.name for row, _, _ in _ROWS.values())
 def _translation(master: MasterRecord, kind: Translation, place: Array | None, linear: Linear | None) -> Array | None:
     """(M, k) what the row of a translation is given; None where the master does not hold it."""
     if kind == "position":
-        return None if place is None else np.column_stack([place, np.full((len(master), 3), np.nan)])
+        return None if place is None else np.column_stack([place, np.full((len(master), 6), np.nan)])
     if kind == "acceleration":
         if master.C_nb is None or master.f_b is None:
             return None
         force = np.einsum("kij,kj->ki", master.C_nb, master.f_b)
-        return np.column_stack([force, np.full((len(master), 6), np.nan)])
+        return np.column_stack([force, np.full((len(master), 12), np.nan)])
     if master.v_n is None:
         return None
     measured = np.full((len(master), MASTER_VELOCITY.width), np.nan)
@@ -340,29 +373,6 @@ def _quaternions(C: Array) -> Array:
     known = np.isfinite(C).all(axis=(1, 2))
     found[known] = quaternion_from_dcm(C[known])
     return found
-
-
-def _slopes(slave: ImuRecord, times: Array) -> Array:
-    """(M, 6) derivatives of the slave's rate and specific force; NaN at the ends.
-
-    From means over `SLOPE` before and after; where those over `SHARP` differ by more than their noise, these: a mean that looks
-    ahead would see a manoeuvre begin before it does, and take the agreement of both forces until then for knowledge of the delay.
-    """
-    edges = np.append(slave.time[0] - slave.steps[0], slave.time)
-    whole = np.vstack([np.zeros(6), np.cumsum(np.column_stack(increments(slave)), axis=0)])
-
-    def over(h: float) -> Array:
-        before, now, after = (
-            np.column_stack([np.interp(times + shift, edges, column) for column in whole.T]) for shift in (-h, 0.0, h)
-        )
-        return np.asarray((after - 2.0 * now + before) / h**2)
-
-    smooth, sharp = over(SLOPE), over(max(SHARP, slave.interval))
-    inside = (times - SLOPE >= edges[0]) & (times + SLOPE <= edges[-1])
-    apart = np.abs(sharp - smooth)
-    noise = 1.4826 * np.median(apart[inside], axis=0) if inside.any() else 0.0
-    moved = np.any(apart > APART * noise, axis=1)[:, None]  # all six alike: their columns tell delay from arm
-    return np.where(inside[:, None], np.where(moved, sharp, smooth), np.nan)
 
 
 def _acceleration(master: MasterRecord, place: Array | None) -> Array:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_quaternion, dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, transport_rate_n
+from truenorth.errors.bending import BENDING
 from truenorth.errors.master import ARM, DELAY, FILTER, MOUNTING
 from truenorth.errors.walks import Walks
 from truenorth.estimate.loop import SAME_TIME
@@ -37,7 +38,15 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 Array = NDArray[np.float64]
 
 LINEAR = 0.02  # rad: of an attitude to linearise with, one sigma
-CONSTANTS = (DELAY, FILTER, ARM, MOUNTING, GYRO_AXES, ACCEL_AXES)  # groups of what does not change in a log, or hardly
+CONSTANTS = (
+    DELAY,
+    FILTER,
+    ARM,
+    MOUNTING,
+    GYRO_AXES,
+    ACCEL_AXES,
+    BENDING,
+)  # groups of what does not change in a log, or hardly
 
 
 @dataclass(frozen=True)

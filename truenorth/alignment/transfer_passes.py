@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.matching import FIRST_NOISE, Translation
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.transfer_bending import bend_along
 from truenorth.alignment.transfer_columns import columns_along
 from truenorth.alignment.transfer_filter import (
     Assumed,
@@ -24,9 +25,10 @@ from truenorth.alignment.transfer_filter import (
     master_aiding,
     transfer_filter,
 )
-from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_for, found_by
+from truenorth.alignment.transfer_nominal import Carried, Nominal, carried_back, carried_for, found_by
 from truenorth.alignment.transfer_rows import by_rows
 from truenorth.alignment.transfer_smoothed import LONGEST, flatter_along
+from truenorth.errors.bending import BENDING
 from truenorth.errors.master import ARM, DELAY, FILTER, MOUNTING, TransferModel
 from truenorth.estimate.batch import OpenPass, settle
 from truenorth.estimate.memory import REOPENED, USED
@@ -195,6 +197,7 @@ def _linear(
     """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own.
 
     Where rows of velocity with this noise, m/s, come next, with what their filter makes flatter; in an open loop, their columns.
+    Of a seat that bends, how.
     """
     C_nb, carried = np.full((len(master), 3, 3), np.nan), carried_back(slave, track, carried_for(slave, model))
     rows = np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)
@@ -211,17 +214,35 @@ def _linear(
     # No filter is early, or later than is borne: what is found beyond is the fault of something else, and a row there tells less.
     of_filter = 0.0 if own is None else float(np.clip(track.sensors[-1, own][0], 0.0, LONGEST))
     held = master.time - assumed.delay - late - of_filter
+    bend = None
+    if any(model.flexure_sigma) and master.C_nb is not None:
+        C_rigid, when = rigid_rows(master, track, carried, assumed)
+        own_k = track.layout.slice_of(BENDING)
+        coupling = np.array(model.coupling) + (0.0 if own_k is None else track.sensors[-1, own_k])
+        bend = bend_along(slave, carried, C_rigid, when, model, coupling)
     if sigma is not None:
         if of_filter != 0.0:
             C_late = np.full_like(C_nb, np.nan)
             C_late[rows] = carried.at(slave, held[rows])
         seat = (assumed.lever_arm, assumed.lever_arm_sigma)
-        flatter = flatter_along(slave, track, carried, model, held, seat, sigma)
+        flatter = flatter_along(slave, track, carried, model, held, seat, sigma, bend)
     if sigma is not None and opened:
         said = (assumed.lever_arm, assumed.lever_arm_sigma, assumed.delay_sigma)
         calibrated = before is not None and before.columns is not None
-        columns = columns_along(slave, track, carried, model, held, said, sigma, calibrated)
-    return Linear(C_nm, C_nb, late, begin, phase, columns, flatter=flatter, late=of_filter, C_late=C_late)
+        columns = columns_along(slave, track, carried, model, held, said, sigma, calibrated, bend)
+    return Linear(C_nm, C_nb, late, begin, phase, columns, flatter=flatter, late=of_filter, C_late=C_late, bend=bend)
+
+
+def rigid_rows(master: MasterRecord, track: Track, carried: Carried, assumed: Assumed) -> tuple[Array, Array]:
+    """Attitudes of the rigid body (K, 3, 3) at a master's rows, by its own and the mounting, in the axes in which `carried.q` is.
+
+    With them the times at which they held (K,), s, by what a pass has found.
+    """
+    assert master.C_nb is not None
+    rows, tau = np.searchsorted(master.time - assumed.delay, by_rows(track).stamp), track.layout.slice_of(DELAY)
+    late = 0.0 if tau is None else float(track.sensors[-1, tau][0])
+    C_nb = master.C_nb[rows] @ axes_along(track, assumed)[-1]
+    return np.swapaxes(carried.C_n0, 1, 2) @ C_nb, master.time[rows] - assumed.delay - late
 
 
 def _with_scatter(found: Linear, before: Linear | None, track: Track, sources: list[Aiding]) -> Linear:

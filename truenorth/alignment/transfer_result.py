@@ -72,6 +72,8 @@ class Transfer:
         The slave's scale factors and misalignments (:mod:`truenorth.errors.axes`), where they were estimated.
     force : (3,) array, m/s^2
         Specific force at rest, slave axes: the accelerometers' axes of `known` act on what differs from it.
+    coupling, coupling_sigma : (3,) arrays or None
+        How far the end of a seat that bends moves for what it turns about right, forward and up (:mod:`truenorth.errors.bending`).
     acting_bias : (3,) array or None, m/s^2
         As that of an alignment on the move (:class:`truenorth.alignment.moving.Moving`).
     """
@@ -104,6 +106,8 @@ class Transfer:
     known: Mapping[str, Array] = field(default_factory=dict)
     force: Array = field(default_factory=standing)
     acting_bias: Array | None = None
+    coupling: Array | None = None
+    coupling_sigma: Array | None = None
 
     @property
     def delay_estimated(self) -> bool:
@@ -137,6 +141,9 @@ class Transfer:
         def known(value: float) -> float | None:
             return float(value) if np.isfinite(value) else None
 
+        bends = {}
+        if self.coupling is not None and self.coupling_sigma is not None:
+            bends = {"coupling": self.coupling.tolist(), "coupling_sigma": self.coupling_sigma.tolist()}
         return {
             "matching": self.matching,
             "velocity_m_s": self.v_n.tolist(),
@@ -149,6 +156,7 @@ class Transfer:
             "mounting_deg": np.degrees(self.mounting).tolist(),
             "mounting_sigma_deg": np.degrees(self.mounting_sigma).tolist(),
             "mounting_estimated": self.mounting_estimated.tolist(),
+            **bends,
             "master_velocity_noise_m_s": known(self.velocity_noise),
             "master_position_noise_m": known(self.position_noise),
             "master_acceleration_noise_m_s2": known(self.acceleration_noise),

@@ -37,6 +37,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.transfer_bending import Bend
 from truenorth.alignment.transfer_columns import Means
 from truenorth.alignment.transfer_nominal import Carried
 from truenorth.alignment.transfer_turns import HALVES
@@ -61,6 +62,7 @@ def flatter_along(
     held: Array,
     said: tuple[Array, float],
     sigma: float,
+    bend: Bend | None = None,
 ) -> Array | None:
     """(M, 6) ``v..``, m/s^3, and ``v...``, m/s^4, of the master, n; NaN near the ends of a log; None where it has no filter.
 
@@ -74,6 +76,8 @@ def flatter_along(
         Lever arm and its sigma, before the log.
     sigma : float, m/s
         Noise of a row.
+    bend : Bend, optional
+        How its seat bends.
     """
     own = track.layout.slice_of(FILTER)
     if own is None:
@@ -83,30 +87,33 @@ def flatter_along(
     # Not of the arm as found: longer means by it would move it, to and fro.
     reach = float(lever_arm @ lever_arm) + 3.0 * arm_sigma**2
     constant = min(math.sqrt(2.0 * max(float(track.sensors[-1, own][1]), 0.0)), LONGEST)
-    means, walk, push = Means(slave, track, carried, held, arm), model.gyro_random_walk, model.accel_random_walk
+    means, walk, push = Means(slave, track, carried, held, arm, bend), model.gyro_random_walk, model.accel_random_walk
     lengths = [h for h in HALVES if h > 2.0 * slave.interval]
 
-    def shown(ideal: float, known: float, derivative: Callable[[float], Array], noise: tuple[int, int, int]) -> Array:
+    def shown(
+        ideal: float, known: float, derivative: Callable[[float, bool], Array], noise: tuple[int, int, int]
+    ) -> Array:
         """(M, 3) a derivative by the shortest means whose noise is little, and what of it is no noise."""
         of_push, of_walk, order = noise
         shortest = max(ideal, 2.0 * lengths[0])
         column = np.zeros((len(held), 3))
         for h in np.geomspace(shortest, max(shortest, lengths[-1]), STEPS):
-            column = derivative(h)
+            column, bent = derivative(h, False), derivative(h, True)
             there = np.isfinite(column).all(axis=1)
             each = of_push * push**2 / h**order + of_walk * reach * walk**2 / h ** (order + 2)
-            N, G = (known / sigma) ** 2 * np.array([len(track) * each, np.sum(column[there] ** 2)])
+            of_noise = len(track) * each + np.nansum(bent**2)
+            N, G = (known / sigma) ** 2 * np.array([of_noise, np.sum(column[there] ** 2)])
             column = column * max(0.0, 1.0 - N / max(G, 1e-300))
             if max(FALSE, SHARE * G) > N:
                 break
         return column
 
-    def first(h: float) -> Array:
-        after, before = (means.held_at(shift, 0.5 * h) for shift in (h, -h))
+    def first(h: float, bent: bool) -> Array:
+        after, before = (means.held_at(shift, 0.5 * h, bent) for shift in (h, -h))
         return np.asarray((after - before) / (2.0 * h))
 
-    def second(h: float) -> Array:
-        after, now, before = (means.held_at(shift, 0.5 * h) for shift in (h, 0.0, -h))
+    def second(h: float, bent: bool) -> Array:
+        after, now, before = (means.held_at(shift, 0.5 * h, bent) for shift in (h, 0.0, -h))
         return np.asarray((after - 2.0 * now + before) / h**2)
 
     _, flat_sigma, skew_sigma = model.filter

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.matching import Matched
 from truenorth.alignment.transfer_delay import (
     WINDOW,
     Found,
@@ -18,6 +19,7 @@ from truenorth.alignment.transfer_delay import (
     runs_backwards,
 )
 from truenorth.alignment.transfer_filter import Assumed
+from truenorth.alignment.transfer_smoothed import filter_sigmas
 from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR, radii
 from truenorth.core.errors import DataError, UsageError
@@ -27,6 +29,7 @@ from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME
 from truenorth.errors.master import ATTITUDE_ERROR, PLACE_SIGMA, MasterErrors, TransferModel
 from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.flexure import FlexureSpec
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
@@ -39,6 +42,7 @@ Array = NDArray[np.float64]
 
 SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
+DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
 FIRST = 1.0  # s over which those are taken
 AGAIN = 5.0  # s: sooner no manoeuvre comes again
 OUTAGE = 3.0  # intervals without a row
@@ -181,6 +185,32 @@ def model_from_spec(
     )
 
 
+def model_for(
+    spec: ImuSpec,
+    assumed: Assumed,
+    what: Matched,
+    flexure: FlexureSpec | None,
+    errors: MasterErrors,
+    axes: tuple[Group, ...],
+) -> TransferModel:
+    """States for what is matched; of the master's errors, those that act on it."""
+    of_rows = errors
+    if what.translation != "velocity":
+        of_rows = replace(of_rows, velocity=0.0, velocity_drift=0.0)
+    if not what.attitude and what.translation != "acceleration":
+        of_rows = replace(of_rows, attitude_drift=0.0, heading_drift=None, level=0.0, heading=0.0)
+    bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
+    model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, of_rows, axes)
+    if flexure is not None and what.translation is not None:
+        model = replace(model, coupling=flexure.coupling, coupling_sigma=flexure.coupling_sigma)
+    if what.translation == "position":  # place and velocity are against a master whose own velocity error wanders
+        walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
+        model = replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))
+    if what.translation == "velocity":
+        model = replace(model, filter=filter_sigmas(errors.filter, what.attitude))
+    return replace(model, arm_considered=what.translation == "acceleration")
+
+
 def bias_sigmas(spec: ImuSpec) -> tuple[Array, Array]:
     """(3,) sigmas of what acts as gyro and accelerometer bias: at level, scale factor and misalignment times gravity too."""
     variance = spec.bias_variance
@@ -196,6 +226,7 @@ def hand_over(
     assumed: Assumed,
     noise: tuple[float, float],  # (velocity, attitude) m/s and rad: of the master's rows
     position: Position | None,  # where the master gives none
+    errors: MasterErrors,  # all that is said of the master's own, also those that no row bears: it hands the start over
 ) -> tuple[ImuRecord, Start]:
     """The slave's record from the master's first row on, and its first state as the master gives it.
 
@@ -235,7 +266,7 @@ def hand_over(
         if not model.mounting:
             phi = np.hypot(phi, assumed.mounting_sigma)
         if ATTITUDE_ERROR not in model.groups:  # not matched, and handed over once
-            phi = np.hypot(phi, [model.master.level, model.master.level, model.master.heading])
+            phi = np.hypot(phi, errors.attitude)
     else:
         C = _from_course(master, assumed, f)
         phi = np.array([LEVEL_SIGMA, LEVEL_SIGMA, COURSE_SIGMA])

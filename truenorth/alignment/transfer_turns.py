@@ -33,6 +33,8 @@ INSTANT = 0.85  # variance of the rate at an epoch, of that of a sample (`descri
 HALVES = (0.05, 0.1, 0.2, 0.4, 0.8)  # s, before and after
 SHARE = 0.01  # of what tells the delay, that may be noise
 ASKEW = 5e-4  # s: of a false delay, by what the noise of a spin and of a velocity's arm have in common
+SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
+SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
 # The acceleration of a velocity row: by the master or the instant, by a mean spin, or not.
 KNOWN, MEAN, UNKNOWN = 0.0, 1.0, 2.0
 # Points of the fast part a row: a straight line from one to the next is a tone of five rows a period within 1 %.
@@ -55,7 +57,7 @@ class Split:
     """
 
     def __init__(self, rates: Array, begins: float, interval: float, edge: float) -> None:
-        self.begins, self.interval, self.rows = begins, interval, len(rates)
+        self.begins, self.interval, self.edge, self.rows = begins, interval, edge, len(rates)
         self._whole = np.fft.rfft(np.concatenate([rates, rates[::-1]]), axis=0)  # there and back: no jump at the ends
         self._f = np.arange(len(self._whole))[:, None] / (2.0 * len(rates) * interval)
         self._passed = 0.5 * (1.0 + np.cos(math.pi * np.clip(self._f / edge - 1.0, 0.0, 1.0)))
@@ -111,6 +113,11 @@ class Shaken:
 
     def __init__(self, split: Split, times: Array) -> None:
         self.split, self.times = split, times
+
+    def alike(self, rates: Array) -> Shaken:
+        """Other rates (N, 3) of the same samples, split at the same frequency."""
+        own = self.split
+        return Shaken(Split(rates, own.begins, own.interval, own.edge), self.times)
 
     @property
     def slow(self) -> Array:
@@ -185,9 +192,42 @@ def spins_at(slave: ImuRecord, times: Array, walk: float, arm: float, push: floa
         # What a spin has in common with a rate off its middle is as a part of it: walk^2 / half^2.
         common = (walk * arm / half) ** 2
         if half > 2.0 * T and 4.0 * common / half < enough and common < ASKEW * push**2:
-            late, early = (_mean_rate(slave, times + s, 0.5 * half) for s in (0.5 * half, -0.5 * half))
-            return (late - early) / half, MEAN
+            return spins_of(slave, times, half), MEAN
     return None, UNKNOWN
+
+
+def spins_of(slave: ImuRecord, times: Array, half: float) -> Array:
+    """(M, 3) mean derivatives of the rate about some times, over so long before and after, rad/s^2."""
+    late, early = (_mean_rate(slave, times + s, 0.5 * half) for s in (0.5 * half, -0.5 * half))
+    return np.asarray((late - early) / half)
+
+
+def rates_at(slave: ImuRecord, times: Array) -> Array:
+    """(M, 3) rates at some times, rad/s: means over two samples before and after."""
+    return _mean_rate(slave, times, 2.0 * slave.interval)
+
+
+def slopes_at(slave: ImuRecord, times: Array) -> Array:
+    """(M, 6) derivatives of the slave's rate and specific force; NaN at the ends.
+
+    From means over `SLOPE` before and after; where those over `SHARP` differ by more than their noise, these: a mean that looks
+    ahead would see a manoeuvre begin before it does, and take the agreement of both forces until then for knowledge of the delay.
+    """
+    edges = np.append(slave.time[0] - slave.steps[0], slave.time)
+    whole = np.vstack([np.zeros(6), np.cumsum(np.column_stack(increments(slave)), axis=0)])
+
+    def over(h: float) -> Array:
+        before, now, after = (
+            np.column_stack([np.interp(times + shift, edges, column) for column in whole.T]) for shift in (-h, 0.0, h)
+        )
+        return np.asarray((after - 2.0 * now + before) / h**2)
+
+    smooth, sharp = over(SLOPE), over(max(SHARP, slave.interval))
+    inside = (times - SLOPE >= edges[0]) & (times + SLOPE <= edges[-1])
+    apart = np.abs(sharp - smooth)
+    noise = 1.4826 * np.median(apart[inside], axis=0) if inside.any() else 0.0
+    moved = np.any(apart > APART * noise, axis=1)[:, None]  # all six alike: their columns tell delay from arm
+    return np.where(inside[:, None], np.where(moved, sharp, smooth), np.nan)
 
 
 def push_of(time: Array, v_n: Array) -> float:

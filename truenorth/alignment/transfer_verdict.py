@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,9 +63,11 @@ def judge_transfer(
             )
         )
     evidence += [note("transfer.open", states=words) for words in transfer.open]
-    evidence.append(_against_what(transfer))
     needs = "match_velocity" if transfer.matching == "attitude" else "manoeuvre"
-    return judged(answer, counted_once(evidence), heading_limit, waiting=False, remedies=(needs,))
+    answer = judged(answer, counted_once(evidence), heading_limit, waiting=False, remedies=(needs,))
+    assert answer.transfer is not None
+    # After the judge, who widens both sigmas by what the evidence shows: what is said is what the result holds.
+    return replace(answer, evidence=(*answer.evidence, _against_what(answer.transfer)))
 
 
 def _against_what(transfer: Transfer) -> Evidence:

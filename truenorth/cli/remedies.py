@@ -39,6 +39,7 @@ OPTIONS = {
     "master_drift": "--master-sigma",
     "transfer_geometry": "--axes, --lever-arm, --mounting, --delay",
     "flexure": "--flexure",
+    "bending": "--flexure '{size:deg|.2g} deg,{lasts:.2g} s'",
     "log_error": "--log-drift",
     "log_kind": "--log-kind",
     "log_arm": "--wheel-arm",

@@ -7,6 +7,7 @@
 | `FILTER` | a filter of its velocity: mean delay beyond its attitude's, variance / 2, third moment / 6 | s, s^2, s^3 |
 | `MOUNTING` | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
 | `FLEXURE` | the slave's seat turned against the rigid body, slave axes; behind it its rate | rad, rad/s |
+| `BENDING` | how far its end moves for what it turns, by axis (:mod:`truenorth.errors.bending`) | 1 |
 | `GYRO_AXES`, `ACCEL_AXES` | scale factors and misalignments of the slave's sensors, by rows (:mod:`truenorth.errors.axes`) | 1 |
 | `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: a constant and a drift each | m/s, rad |
 
@@ -30,9 +31,11 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
 from truenorth.errors.axes import known_as_bias
+from truenorth.errors.bending import BENDING, bending
 from truenorth.errors.group import Group
 from truenorth.errors.model import InsModel
 from truenorth.errors.walks import Walks
+from truenorth.records.flexure import COUPLING
 from truenorth.state.layout import ACCEL_AXES, DV, GYRO_AXES, PHI, Layout
 from truenorth.state.prior import joined, prior_covariance
 
@@ -50,6 +53,7 @@ _OF_GROUPS = {
     FILTER: (("lambda", "chi", "kappa"), "s"),
     MOUNTING: (tuple(f"mu_{axis}" for axis in "xyz"), "rad"),
     FLEXURE: (tuple(f"theta_{axis}" for axis in "xyz") + tuple(f"theta'_{axis}" for axis in "xyz"), "rad"),
+    BENDING: (tuple(f"k_{side}" for side in SIDES), "1"),
     VELOCITY_ERROR: (tuple(f"master_dv_{axis}" for axis in "ENU"), "m/s"),
     ATTITUDE_ERROR: (tuple(f"master_phi_{axis}" for axis in "ENU"), "rad"),
     GYRO_AXES: (tuple(f"M_g {row}{column}" for row in "xyz" for column in "xyz"), "1"),
@@ -101,6 +105,11 @@ class MasterErrors:
             raise UsageError(
                 f"correlation time of the master's errors {self.correlation_time:g} s; expected above zero"
             )
+
+    @property
+    def attitude(self) -> Array:
+        """(3,) sigmas of the errors about east, north and up, constant and drift, rad."""
+        return np.hypot([self.level, self.level, self.heading], self.attitude_drifts)
 
     @property
     def attitude_drifts(self) -> tuple[float, float, float]:
@@ -212,6 +221,8 @@ class TransferModel(Walks):
     # (3,) rad: of the seat's angles about right, forward, up; zeros: it does not bend, and there are no such states
     flexure_sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
     flexure_beta: float = 1.0  # rad/s; natural frequency of its critically damped processes
+    coupling: tuple[float, float, float] = (COUPLING,) * 3  # of the end of a seat that bends, as assumed
+    coupling_sigma: float = 0.0  # 0: it is known, and no state
     master: MasterErrors = MasterErrors()  # of the master itself; zeros: it is taken for the truth
     filter: tuple[float, float, float] = (
         0.0,
@@ -242,11 +253,17 @@ class TransferModel(Walks):
         if any(self.flexure_sigma):
             found.append(Group(FLEXURE, np.array(self.flexure_sigma), frequency=self.flexure_beta, unit="rad"))
         found += self.axes
-        for name, constant, drift, unit in (
-            (VELOCITY_ERROR, np.full(3, of.velocity), np.full(3, of.velocity_drift), "m/s"),
-            (ATTITUDE_ERROR, np.array([of.level, of.level, of.heading]), np.array(of.attitude_drifts), "rad"),
+        if any(self.flexure_sigma) and self.coupling_sigma > 0.0:
+            found.append(bending(self.coupling_sigma))
+        for name, sigma, drift, unit in (
+            (
+                VELOCITY_ERROR,
+                np.full(3, math.hypot(of.velocity, of.velocity_drift)),
+                np.full(3, of.velocity_drift),
+                "m/s",
+            ),
+            (ATTITUDE_ERROR, of.attitude, np.array(of.attitude_drifts), "rad"),
         ):
-            sigma = np.hypot(constant, drift)
             if sigma.any():
                 lasts = of.correlation_time * np.divide(sigma**2, drift**2, out=np.full(3, np.inf), where=drift > 0.0)
                 found.append(Group(name, sigma, lasts, considered=self.considered, unit=unit))

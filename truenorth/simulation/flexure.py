@@ -1,7 +1,8 @@
-"""A structure that bends: the slave IMU turns on its mount while the rigid body, and with it the master, does not.
+"""A structure that bends: the slave IMU turns and moves while the rigid body, and with it the master, does not.
 
 The motion beneath is that of the rigid body at the slave's place. The truth of the slave is the *flexed* motion; a master is
-simulated from the motion beneath. Flexure turns the slave in its place (its lever arm stays that of the rigid body).
+simulated from the motion beneath. A slave on a mount that yields turns in its place. One at an arm `r` from where its structure is
+clamped moves, too, by ``delta = (k theta) x r`` (:mod:`truenorth.errors.bending`).
 
 Each angle is a second-order Gauss-Markov process, as is usual for wings and decks (J. Kain and J. Cloutier, Rapid transfer
 alignment for tactical weapon applications, AIAA GNC 1989). It is drawn exactly at knots and continued between them by cubics
@@ -12,6 +13,7 @@ through angle and rate, which for a process driven by white angular acceleration
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +24,10 @@ from truenorth.core.errors import UsageError
 from truenorth.records.flexure import FlexureSpec
 from truenorth.records.motion import MotionStates, Moving
 from truenorth.simulation.aiding import Draws
+from truenorth.simulation.gnss import place_of
 from truenorth.simulation.motion import body_rates
 from truenorth.simulation.processes import second_order_gauss_markov
+from truenorth.simulation.sensing import acceleration_gain
 
 Array = NDArray[np.float64]
 KNOT = 0.1  # of 1/beta
@@ -61,9 +65,14 @@ class Flexed:
         self.span = start, start + duration
         self.knots = start + step * np.arange(math.ceil(duration / step) + 2)
         rng = Draws("flexure", seed, run, scenario)("")
-        angles, rates = second_order_gauss_markov(np.array(spec.sigma), spec.beta, step, len(self.knots), rng)
+        angles, rates = self.drawn(rng)
         self._angles: Any = CubicHermiteSpline(self.knots, angles, rates)
         self._rates, self._accelerations = self._angles.derivative(1), self._angles.derivative(2)
+
+    def drawn(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Heading, pitch and roll relative to the rigid body at the knots, and how fast they change, (K, 3) rad and rad/s."""
+        step = float(self.knots[1] - self.knots[0])
+        return second_order_gauss_markov(np.array(self.spec.sigma), self.spec.beta, step, len(self.knots), rng)
 
     @property
     def breaks(self) -> Array:
@@ -85,7 +94,15 @@ class Flexed:
         angles, rates, accelerations = (
             np.moveaxis(f(t), -1, 0) for f in (self._angles, self._rates, self._accelerations)
         )
-        return turned(self.motion.states(t), angles, rates, accelerations)
+        at = self.motion.states(t)
+        if np.any(self.spec.arm):
+            at = shifted(at, *(self._moved(of) for of in (angles, rates, accelerations)))
+        return turned(at, angles, rates, accelerations)
+
+    def _moved(self, angles: Array) -> Array:
+        """(..., 3) what these angles (heading, pitch, roll), or their derivatives, move the slave by, rigid body's axes."""
+        turn = np.stack([angles[1], angles[2], -angles[0]], axis=-1)
+        return np.cross(np.asarray(self.spec.coupling) * turn, self.spec.arm)
 
     def _checked(self, t: ArrayLike) -> Array:
         t = np.asarray(t, dtype=np.float64)
@@ -95,6 +112,14 @@ class Flexed:
                 "it a longer duration"
             )
         return t
+
+
+def shifted(at: MotionStates, away: Array, speed: Array, acceleration: Array) -> MotionStates:
+    """The motion of a point of a body that is displaced in the body's axes, (..., 3) m, m/s, m/s^2, and does not turn."""
+    lat, lon, alt, v_n = place_of(at, away)
+    w, moving = at.w_ib_b, (at.C_nb @ speed[..., None])[..., 0]
+    more = acceleration + 2.0 * np.cross(w, speed) + (acceleration_gain(at) @ away[..., None])[..., 0]
+    return replace(at, lat=lat, lon=lon, alt=alt, v_n=v_n + moving, f_b=at.f_b + more)
 
 
 def turned(at: MotionStates, angles: Array, rates: Array, accelerations: Array) -> MotionStates:

@@ -134,13 +134,13 @@ class HeightSpec(OutlyingSpec[HeightRecord]):
 
 
 def place_of(at: MotionStates, arm: Any) -> tuple[Array, Array, Array, Array]:
-    """Latitude, longitude, height and velocity of a point of the body at an arm (m, body axes) from the IMU."""
+    """Latitude, longitude, height and velocity of a point of the body at an arm (m, body axes; one, or one each) from the IMU."""
     if not np.any(arm):
         return at.lat, at.lon, at.alt, at.v_n
     r = np.asarray(arm, dtype=np.float64)
     w_in_n = earth_rate_n(at.lat) + transport_rate_n(at.lat, at.alt, at.v_n)
     w_nb_b = at.w_ib_b - np.einsum("...ji,...j->...i", at.C_nb, w_in_n)
-    away, moving = at.C_nb @ r, np.einsum("...ij,...j->...i", at.C_nb, np.cross(w_nb_b, r))
+    away, moving = (at.C_nb @ r[..., None])[..., 0], np.einsum("...ij,...j->...i", at.C_nb, np.cross(w_nb_b, r))
     away, moving, v_n, still = (np.moveaxis(x, -1, 0) for x in (away, moving, at.v_n, np.zeros_like(away)))
     lat, lon, alt, v_n, _ = displaced((at.lat, at.lon, at.alt, v_n, still), (away, moving, still))
     return lat, lon, alt, np.ascontiguousarray(np.moveaxis(v_n, 0, -1))

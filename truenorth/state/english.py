@@ -233,7 +233,11 @@ SENTENCES = {
         "vibration moves the slave against its master by {size:.2g} m/s, at a phase that the delay does not tell: level may be off "
         "by {level:angle} (one sigma), which its sigma has; give lever arm and delay with smaller sigmas"
     ),
-    "transfer.relative": "sigma is against the master, whose own errors come on top: they were not given",
+    "transfer.bends": (
+        "the slave turns by {size:angle} (RMS) at some {frequency:.2g} Hz, and the master's attitude does not: what is between "
+        "them bends, and delay, lever arm and mounting of a rigid arm may be false"
+    ),
+    "transfer.relative": "sigma is against the master, whose own errors come on top: none of what is matched were given",
     "transfer.open": "left open by this motion: {states}",
     # ---- clocks, arms, scales and mountings left open
     "mounting.missed": (

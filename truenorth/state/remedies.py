@@ -57,6 +57,7 @@ REMEDIES = {
     "transfer_geometry": "check the axes, the lever arm, the mounting and the delay",
     "without_filter": "give the master's velocity without a filter, or with a faster one",
     "flexure": "check whether both sit on one rigid body",
+    "bending": "say how much it bends, and for how long",
     "slave_axes": "check the slave's axes",
     "transfer.delay": "check the delay",
     "transfer.lever_arm": "check the lever arm",
