@@ -36,7 +36,7 @@ from truenorth.estimate.latency import delay_of
 from truenorth.state.layout import DV
 from truenorth.state.track import Track
 
-SURE = 1e-3  # variance of velocity over its square: less moves a delay by milliseconds
+SURE = 1e-2  # variance of velocity over its square: less (cars have .002 to .005) moves a delay by a tenth of its sigma
 MOST = 6000  # fixes and rows of the track: a smoother holds the links from each to the next
 
 

@@ -291,7 +291,7 @@ SENTENCES = {
     "height.apart": "the barometer's heights are {apart:+.0f} m off those of GNSS; one sigma of both together is {sigma:.3g} m",
     "height.either": (
         "the barometer's heights are {apart:+.0f} m off those of GNSS; one sigma of both together is {sigma:.3g} m; which of them "
-        "is off is not known, and sigma of height counts the difference"
+        "is off is not known, and height may be off by as much"
     ),
     "height.first": (
         "the barometer's first heights are {apart:+.0f} m off the height of the start; one sigma of both together is {sigma:.3g} m"
