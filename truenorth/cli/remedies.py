@@ -19,6 +19,7 @@ OPTIONS = {
     "imu_axes": "--axes",
     "slave_axes": "--axes",
     "mounting": "--mounting",
+    "mounting_said": "--mounting",
     "baseline": "--baseline",
     "offset": "--offset {sensor}={offset:.3f}",
     "latency": "--latency {latency:.3f}",

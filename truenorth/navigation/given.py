@@ -87,6 +87,17 @@ def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
     return said
 
 
+def said_to_sit(given: Mapping[str, Any], begin: Start) -> list[str]:
+    """Keys of aids of which somebody has said how they sit, other than an alignment has found it.
+
+    Two antennas of which nothing is said lie one ahead of the other.
+    """
+    found = mountings_found(begin)
+    mounted = {key: m for key, a in given.items() if (m := getattr(a, "mounting", None)) is not None}
+    said = [key for key, m in mounted.items() if key not in found or not _says_the_same(key, m, found[key])]
+    return [key for key in given if key == Gnss.key or key in said]
+
+
 def _says_the_same(key: str, given: Mounting, found: Mounting) -> bool:
     """Whether a mounting has what an alignment has found, whatever else is said of it."""
     if key == Gnss.key:

@@ -44,6 +44,7 @@ from truenorth.navigation.given import (
     looked_at,
     record_of,
     said_of,
+    said_to_sit,
     taken_over,
     with_rows,
 )
@@ -221,9 +222,7 @@ def _by_specification(
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     begin = arm_as_begun(begin, getattr(given.get(Gnss.key), "mounting", None))
-    seated = [
-        SENSORS[key][0] for key, a in given.items() if key in SENSORS and (key == Gnss.key or a.mounting is not None)
-    ]
+    seated = [SENSORS[key][0] for key in said_to_sit(given, begin) if key in SENSORS]
     taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
     modelled = partial(_model, begin, (*errors, *deflection.groups), scale_factors, height)

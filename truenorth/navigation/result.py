@@ -308,6 +308,7 @@ def judged_navigation(result: Navigation, evidence: Sequence[Evidence], least: A
     On the way sigmas of the first m states grow by (K, m) times at `least`, unless the model is contradicted.
     """
     claim = last_sigma(result.track)
+    least = None if least is None or np.all(least == 1.0) else least  # days of covariances are not copied for nothing
     verdict = judge(Claim(claim), evidence)
     status: Status = verdict.status("navigated")  # type: ignore[assignment]  # heading has no limit here
     if status != "inconsistent" and (verdict.added != NO_EFFECT or least is not None):

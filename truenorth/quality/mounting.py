@@ -27,6 +27,8 @@ def mounting_evidence(track: Track, names: Iterable[str]) -> list[Evidence]:
         miss, prior = np.abs(track.sensors[-1, at]), np.array(layout.priors[layout.names.index(group)])
         worst = int(np.argmax(miss / prior))
         if miss[worst] > limit("mounting") * prior[worst]:
-            key, remedy = ("mounting.baseline", "baseline") if name == RECEIVER else ("mounting.missed", "mounting")
+            key, remedy = (
+                ("mounting.baseline", "baseline") if name == RECEIVER else ("mounting.missed", "mounting_said")
+            )
             found.append(contradiction(key, remedy, name=name, miss=float(miss[worst]), prior=float(prior[worst])))
     return found

@@ -26,6 +26,7 @@ REMEDIES = {
     "sensor_axes": "check its axes and unit",
     "imu_axes": "check the IMU's axes",
     "mounting": "give the mounting",
+    "mounting_said": "check the mounting that was given, or leave it to be found",
     "baseline": "say in which direction the second antenna lies from the first, and check the heading at the start",
     "estimate.lag": "let it be estimated",
     "estimate.scale": "let it be estimated",
