@@ -111,6 +111,17 @@ def test_a_height_kept_by_gnss_may_be_off_by_what_a_barometer_differs_by(undulat
     assert (growth[:, :8] == 1.0).all()
 
 
+@pytest.mark.parametrize(
+    ("heights", "remedy"),
+    [(RISE, "level.either"), (700.0 + RISE, "level.either"), ((400.0 + RISE) / 0.3048, "height_in_feet")],
+)
+def test_what_no_geoid_explains_is_the_barometers(heights, remedy):
+    """Heights above the start, or in feet: sigma of a receiver's height was 100 times as large."""
+    (found,), growth = either_level(Barometer(HeightRecord(TIME, heights)), receiver(400.0 + RISE), known_to(0.7))
+    assert (found.key, found.remedies, found.kind) == ("height.apart", (remedy,), "note")
+    assert (growth == 1.0).all()
+
+
 def test_a_barometer_that_chance_explains_widens_no_height():
     baro = Barometer(HeightRecord(TIME, 424.0 + RISE))  # the weather: 2.4 sigmas
     found, growth = either_level(baro, receiver(400.0 + RISE), known_to(0.7))

@@ -9,7 +9,8 @@ which of the two is right.
 
 Where height is not kept by the barometer, the other sensor's level is in the answer, and that may be the wrong one as well: a
 receiver's heights above the ellipsoid and those above the sea are N apart, the undulation of the geoid, -106 to 85 m. The answer
-goes on, and its sigma of height counts the difference.
+goes on, and its sigma of height counts the difference. What is further apart is the barometer's: in feet, or heights above the
+place where it was switched on.
 
 Source: ICAO Doc 7488, *Manual of the ICAO Standard Atmosphere*, 3rd ed. (1993), for height by pressure; N. Pavlis et al., "The
 development and evaluation of the Earth Gravitational Model 2008", J. Geophys. Res. 117 (2012), for N.
@@ -18,6 +19,7 @@ development and evaluation of the Earth Gravitational Model 2008", J. Geophys. R
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -37,6 +39,8 @@ Array = NDArray[np.float64]
 FEWEST = 5  # rows
 FIRST = 5.0  # s of a barometer's rows that are held against the start
 NEIGHBOURS = 5.0  # s, between fixes: heights in between are on the line from one to the next
+GEOID = 106.0  # m; of its undulation, at the most
+FEET = "height_in_feet"  # the remedy
 MOST = 0.1  # of the rows may be as near as the sigmas say: an offset is there all the time
 
 
@@ -66,7 +70,7 @@ def either_level(barometer: Barometer, receiver: Gnss, track: Track) -> tuple[li
     """That a barometer by which height is not kept has another level than the receiver, and by how much sigmas grow for it.
 
     No answer is refused for a sensor that it does not use. Nor is the level that it does use known to be right: by as much as both
-    are apart, where that is beyond chance, height may be off.
+    are apart, where that is beyond chance and no more than a geoid's undulation, height may be off.
 
     Returns
     -------
@@ -77,8 +81,10 @@ def either_level(barometer: Barometer, receiver: Gnss, track: Track) -> tuple[li
     growth = np.ones((len(track), 9))
     found = _apart("height.either", *_of_both(barometer, receiver), limit("doubt"), partial(note, urgent=True))
     for item in found:
-        own = track.sigma[:, DP.stop - 1]
-        growth[:, DP.stop - 1] = np.hypot(1.0, float(item.figures["apart"]) / np.where(own > 0.0, own, np.inf))
+        apart, sigma, own = float(item.figures["apart"]), float(item.figures["sigma"]), track.sigma[:, DP.stop - 1]
+        if item.remedies == (FEET,) or abs(apart) > GEOID + limit("doubt") * sigma:
+            return [replace(item, key="height.apart")], growth
+        growth[:, DP.stop - 1] = np.hypot(1.0, apart / np.where(own > 0.0, own, np.inf))
     return found, growth
 
 
@@ -133,5 +139,5 @@ def _apart(
     if there.sum() < FEWEST or np.quantile(np.abs(off / sigma)[there], MOST) <= least:
         return []
     in_feet = np.median(np.abs((FOOT * measured - other) / sigma)[there]) < limit("by chance")
-    remedy = "height_in_feet" if in_feet else key.replace("height.", "level.")
+    remedy = FEET if in_feet else key.replace("height.", "level.")
     return [said(key, remedy, apart=float(np.median(off[there])), sigma=float(np.median(sigma[there])))]
