@@ -1,5 +1,6 @@
 """A start that lies within a row of the IMU, as that of a transfer does: the row counts from there."""
 
+import functools
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ import truenorth as tn
 from truenorth.core.attitude import misalignment
 from truenorth.live import Navigator
 from truenorth.navigation import Start
+from truenorth.navigation.procedure import FINE
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import Sway, Tone, simulate
 
@@ -61,9 +63,14 @@ def test_a_start_in_the_last_rows_has_nothing_to_go_on_with(rows):
         tn.navigate(record, start_at(float(record.time[-1]) - rows * record.interval), imu=SPEC)
 
 
-def _lost_after(start, lost, kind, slack=1e-6):
+@functools.cache
+def _log(kind, duration):
+    return simulate(SHIP, rate=25.0, duration=duration, imu=SPEC, seed=2, kind=kind).record
+
+
+def _lost_after(start, lost, kind, slack=1e-6, duration=8.0):
     """The ship's log without the rows of a while after the start's epoch."""
-    record = simulate(SHIP, rate=25.0, duration=8.0, imu=SPEC, seed=2, kind=kind).record
+    record = _log(kind, duration)
     keep = (record.time < start + slack) | (record.time > start + lost + slack)
     return tn.ImuRecord(record.time[keep], record.gyro[keep], record.accel[keep], kind)
 
@@ -93,6 +100,65 @@ def test_rows_that_are_lost_right_after_the_epoch_are_bridged_and_counted(lost, 
     assert lost < 0.5 or whole.track.sigma[-1, 3] > 2.0 * at_once.sigma[-1, 3]
     if lost > 0.04:
         assert run.finish().gaps == pytest.approx(np.array(whole.gaps))
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("rows", [0, 1, 2, 3, 20])
+def test_rows_lost_after_an_epoch_within_a_row_count_once(rows, kind):
+    """Of increments the row made for them counted up to half a row twice: velocity was 9 sigmas off, attitude 4."""
+    for off in np.arange(1, 10) / 10.0:
+        start = start_at(12.0 + 0.04 * off)
+        record = _lost_after(start.time, 0.04 * (rows - off) if rows else 0.0, kind, duration=16.0)
+        whole = tn.navigate(record, start, imu=SPEC, altitude="free", interval=FINE, output=1.0)
+        run = Navigator(start, SPEC, kind=kind, altitude="free")
+        run.push(record.time, record.gyro, record.accel)
+        for track in (whole.track, run.past.track):
+            true = SHIP.states(track.time)
+            assert np.abs((track.v_n - true.v_n) / track.sigma[:, 3:6]).max() < 3.0, off
+            turned = misalignment(track.C_nb[-1], SHIP.states(track.time[-1]).C_nb)
+            assert np.abs(turned / track.sigma[-1, :3]).max() < 3.0, off
+        apart = np.abs(run.answer.motion.v_n - whole.v_n[-1]) / whole.track.sigma[-1, 3:6]
+        assert run.answer.time == whole.time[-1]
+        assert apart.max() < 0.2, off  # of rates, where none is lost
+        ended = run.finish()  # it has the last 10 s of the 12 before the start
+        assert ended.gaps == whole.gaps
+        for name in ("time", "v_n", "C_nb", "P"):
+            np.testing.assert_array_equal(getattr(ended.track, name), getattr(whole.track, name))
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("lost", [0.06, 0.4])
+def test_a_look_back_takes_the_row_that_was_made_anew(kind, lost, tmp_path):
+    """In a run that was saved and goes on, too."""
+    record, start = _lost_after(2.02, lost, kind), start_at(2.012)
+    one, run = (Navigator(start, SPEC, kind=kind, altitude="free") for _ in range(2))
+    one.push(record.time, record.gyro, record.accel)
+    half = record.time < 5.0
+    run.push(record.time[half], record.gyro[half], record.accel[half])
+    run = Navigator.load(run.save(tmp_path / "run.npz"))
+    loop = run._loop
+    loop._take_anew(loop._taken(run.log), loop.shown, run.feeds, run.log)
+    run.push(record.time[~half], record.gyro[~half], record.accel[~half])
+    assert len(loop._first) == 1
+    assert loop.gaps == one._loop.gaps
+    np.testing.assert_allclose(run.answer.C_nb, one.answer.C_nb, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(run.answer.motion.v_n, one.answer.motion.v_n, rtol=0.0, atol=1e-12)
+    off = run.answer.motion.v_n - SHIP.states(run.answer.time).v_n
+    assert np.abs(off / run.answer.motion.v_sigma).max() < 3.0
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("ends", [0.5, 1.5])  # s behind the gap; in the first one late rows may still fill it
+def test_a_log_that_ends_soon_after_a_gap_at_the_epoch_is_finished_as_a_whole_one(kind, ends):
+    """It was refused: "runs from .. s, but the alignment holds at .. s"."""
+    lost, start = _lost_after(2.0, 0.2, kind), start_at(2.0)
+    record = lost.between(None, 2.2 + ends)
+    run = Navigator(start, SPEC, kind=kind, altitude="free")
+    run.push(1.99, [0.0, 0.0, 1e9], [0.0, 0.0, 9.8])  # no sensor measures this: left out
+    run.push(record.time, record.gyro, record.accel)
+    assert (run.answer is None) == (ends < 1.0)
+    whole = tn.navigate(record, start, imu=SPEC, altitude="free", interval=FINE, output=1.0)
+    np.testing.assert_array_equal(run.finish().track.v_n, whole.track.v_n)
 
 
 @pytest.mark.parametrize("kind", ["rates", "increments"])

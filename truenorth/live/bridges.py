@@ -99,7 +99,7 @@ def _unrest(log: Log, until: float, across: Array) -> tuple[float, float]:
     As much as in the last minute of rows; and as a step between the rows next to the gap (6,), which may have come at any time in
     it: its integral is off by ``step / sqrt(12)`` of the gap. A vehicle that stood for a minute may drive off in a gap.
     """
-    part = log.record(until - UNREST, until, earlier=True)
+    part = log.record(until - UNREST, until, before=log.earlier)
     values = np.hstack([part.gyro, part.accel])
     steps = np.diff(part.time)
     whole = steps <= GAP_FACTOR * part.interval if len(part) > 1 else np.empty(0, dtype=bool)

@@ -80,6 +80,13 @@ def as_rows(time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> Array:
     return rows
 
 
+def finite_and_small(rows: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which rows (K, 7) are finite, and which hold what a sensor may measure."""
+    with np.errstate(invalid="ignore"):
+        small = (np.abs(rows[:, 1:4]) < LARGEST_RATE).all(axis=1) & (np.abs(rows[:, 4:]) < LARGEST_FORCE).all(axis=1)
+    return np.asarray(np.isfinite(rows).all(axis=1)), np.asarray(small)
+
+
 class Intake:
     """Sifts rows ``time, gyro (3), accel (3)`` in SI units.
 
@@ -131,11 +138,7 @@ class Intake:
     def _sound(self, rows: Array) -> Array:
         if np.abs(rows[:, 1:]).max(initial=0.0) < LARGEST_RATE and np.isfinite(rows[:, 0]).all():  # NaN is not below
             return rows
-        finite = np.isfinite(rows).all(axis=1)
-        with np.errstate(invalid="ignore"):
-            small = (np.abs(rows[:, 1:4]) < LARGEST_RATE).all(axis=1) & (np.abs(rows[:, 4:]) < LARGEST_FORCE).all(
-                axis=1
-            )
+        finite, small = finite_and_small(rows)
         self.counts.not_finite += int(np.sum(~finite))
         self.counts.too_large += int(np.sum(finite & ~small))
         return rows[finite & small]

@@ -79,8 +79,8 @@ class Log:
         return self.merged / float(np.median(np.diff(self.rows[-500:, 0])))
 
     def passed_over(self, rows: Array) -> None:
-        """Keep the newest of the rows that came before the first one to be kept."""
-        found = np.vstack([self.earlier, rows[np.isfinite(rows).all(axis=1)]])
+        """Keep the newest of the sound rows that came before the first one to be kept."""
+        found = np.vstack([self.earlier, rows])
         found = found[np.unique(found[:, 0], return_index=True)[1]]
         self.earlier = found[found[:, 0] > found[-1, 0] - EARLIER] if len(found) else found
 
@@ -100,12 +100,12 @@ class Log:
                 self._drop(self._most // 4)
         return True
 
-    def record(self, since: float = -np.inf, until: float = np.inf, *, earlier: bool = False) -> ImuRecord:
-        """Rows with ``since < time <= until`` as a record, copied; `earlier`: and those of them that were passed over."""
+    def record(self, since: float = -np.inf, until: float = np.inf, *, before: Array | None = None) -> ImuRecord:
+        """Rows with ``since < time <= until`` as a record, copied; and those of `before`, as long as all are kept."""
         first, last = np.searchsorted(self.rows[:, 0], (since, until), side="right")
         rows = self.rows[first:last].copy()
-        if earlier and self.merged == 1:
-            rows = np.vstack([self.earlier[self.earlier[:, 0] > since], rows])
+        if before is not None and self.merged == 1 and not self.dropped:
+            rows = np.vstack([before[before[:, 0] > since], rows])
         return record_of(rows, self.kind)
 
     @property

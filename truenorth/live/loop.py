@@ -26,14 +26,14 @@ from truenorth.live.log import Kind, Log
 from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.siblings import Siblings
-from truenorth.navigation.first_row import carried_to, row_before_gap
+from truenorth.navigation.first_row import carried_to, lost_after, row_before_gap
 from truenorth.navigation.given import fed_back
 from truenorth.navigation.procedure import FINE, PLUMB_LINE
 from truenorth.navigation.result import Altitude
 from truenorth.navigation.start import force_at_rest
 from truenorth.quality.stamps import stamp_notes, stamp_scatter
 from truenorth.records import ImuRecord
-from truenorth.records.lost_rows import GAP_FACTOR, lack_rows
+from truenorth.records.lost_rows import lack_rows
 from truenorth.records.specs import ImuSpec
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
@@ -65,6 +65,7 @@ class Loop:
 
     made_anew: ClassVar[tuple[str, ...]] = ("_made",)  # not kept in a file
     _made: Setting | None = None
+    _first: Array = np.empty((0, 7))  # the row made before a gap at the start: it never came, the log has it not
 
     def __init__(
         self,
@@ -180,7 +181,7 @@ class Loop:
             if (found := self._from_start(rows, log)) is None:
                 return
             rows = found
-            self._begin(rows, feeds)
+            self._begin(rows, feeds, log)
         self._waiting = [rows]
         count = int(np.searchsorted(rows[:, 0], until, side="right"))
         late = int(np.searchsorted(rows[:, 0], self.end, side="right"))
@@ -208,31 +209,30 @@ class Loop:
         None where late rows may still fill that gap, or where no row says how the vehicle moved before it.
         """
         self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
-        step, interval = rows[0, 0] - self.start.time, np.array([self._interval])
-        if (
-            step <= GAP_FACTOR * self._interval
-            or not lack_rows(rows[:, 0], np.zeros(1, int), np.array([step]), interval)[0]
-        ):
+        first, interval = float(rows[0, 0]), np.array([self._interval])
+        before = float(log.earlier[-1, 0]) if len(log.earlier) else self.start.time
+        lost = lost_after(self.start, first, self._interval)
+        if not lost or not lack_rows(rows[:, 0], np.zeros(1, int), np.array([first - before]), interval)[0]:
             return rows
-        if log.end - LATE <= rows[0, 0]:
+        if log.end - LATE <= first:
             return None
         if not len(log.earlier):
             self.failure = (
-                f"the rows of the IMU begin {step:.3f} s after the start at {self.start.time:.3f} s: what the vehicle did "
-                "until then is not known; push the rows before it as well, or align again"
+                f"the rows of the IMU begin {first - self.start.time:.3f} s after the start at {self.start.time:.3f} "
+                "s: what the vehicle did until then is not known; push the rows before it as well, or align again"
             )
             return None
-        first = row_before_gap(self.start, self._interval, log.earlier[-1, 1:])[None]
-        log.add(first)
-        return np.vstack([first, rows])
+        self._first = row_before_gap(first, lost, self._interval, log.earlier[-1, 1:])[None]
+        return np.vstack([self._first, rows])
 
-    def _begin(self, rows: Array, feeds: Mapping[str, Feed]) -> None:
+    def _begin(self, rows: Array, feeds: Mapping[str, Feed], log: Log) -> None:
         """Make the loop ready, when enough rows are there to know their interval."""
         setting = self.setting(feeds)
         time = float(rows[0, 0]) - self._interval
-        start = carried_to(
-            self.start, np.append(time, rows[0, 1:]), self._interval, increments=self.kind == "increments"
-        )
+        # The row that the epoch lies in:
+        holding = log.earlier[-1] if time > self.start.time and len(log.earlier) else rows[0]
+        row = np.append(time, holding[1:])
+        start = carried_to(self.start, row, self._interval, increments=self.kind == "increments")
         if start is not self.start:
             self.start, self.siblings, self._last = start, Siblings(start), np.full(7, time)
         self._state = begin(setting, self.start, time, self._interval)
@@ -244,7 +244,7 @@ class Loop:
         first, last = np.searchsorted(log.rows[:, 0], (self.start.time, self.end), side="right")
         if self.failure or self._state is None or log.merged > 1 or last - first < FIRST:
             return None
-        return log.record(self.start.time, self.end)
+        return log.record(self.start.time, self.end, before=self._first)
 
     def _look_back(self, feeds: Mapping[str, Feed], log: Log) -> None:
         """Take all rows so far anew, with errors of aids that last as these rows show them."""

@@ -24,7 +24,7 @@ from truenorth.estimate.rivals import counted_once
 from truenorth.live.answer import Answer, Motion
 from truenorth.live.feed import Feed
 from truenorth.live.felt import Felt, without_known
-from truenorth.live.intake import LATE, Intake, as_rows
+from truenorth.live.intake import LATE, Intake, as_rows, finite_and_small
 from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.loop import Loop
@@ -134,7 +134,8 @@ class Navigator:
         passed = rows[:, 0] - self.intake.felt.late <= self.start.time
         with self._lock:
             if passed.any() and not self._loop.begun:
-                self.log.passed_over(rows[passed] - self.intake.felt.late * np.eye(7)[0])
+                sound = passed & np.logical_and(*finite_and_small(rows))
+                self.log.passed_over(rows[sound] - self.intake.felt.late * np.eye(7)[0])
             rows = rows[~passed]
             for block in self.intake.sift(rows):
                 if not self.log.add(block):
@@ -216,7 +217,7 @@ class Navigator:
             came = {key: feed.until(self.log.end, self._mountings.get(key)) for key, feed in self.feeds.items()}
             aids = {key: aid for key, aid in came.items() if aid is not None}
             found = navigate(
-                self.log.record(),
+                self.log.record(before=self.log.earlier),
                 self._given,
                 aid=list(aids.values()),
                 altitude=self._kept_with(aids),

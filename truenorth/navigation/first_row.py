@@ -5,11 +5,14 @@ its length the turn was taken twice. Ships that roll by 5 deg, 50 rows a second,
 4 to 10 sigmas off a quarter of a minute later. So the start is carried to the beginning of the row, by what the row says.
 
 Rows that are lost right after the epoch leave no row before the gap that the navigation takes. One is made, of the last row before
-the epoch, and the gap behind it is bridged and counted as any other.
+the epoch, and the gap behind it is bridged and counted as any other. It ends whole rows before the first that came,
+as a lost row did: an increment counts whole, so between two rows there must be whole rows. Where the epoch lay in a
+row, one made at the epoch counted up to half a row twice, and its gravity: velocity was up to 9 sigmas off.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +28,7 @@ from truenorth.state.state import Start
 Array = NDArray[np.float64]
 
 FEWEST = 2  # rows of a log that goes on
+EVEN = 1e-3  # of a row: half a row is half a row, whatever the rounding of times
 
 
 def from_start(record: ImuRecord, start: Start) -> tuple[ImuRecord, Start]:
@@ -44,20 +48,28 @@ def from_start(record: ImuRecord, start: Start) -> tuple[ImuRecord, Start]:
             "s; expected a log that holds the alignment's epoch and goes on from it, on the same clock"
         )
     part = record[first:]
-    if first in record.gaps and record.time[first] - start.time > GAP_FACTOR * record.interval:
-        held = np.concatenate([record.gyro[first - 1], record.accel[first - 1]])
-        made = row_before_gap(start, record.interval, held)
-        rows = np.vstack([made, np.column_stack([part.time, part.gyro, part.accel])])
-        return replace(part, time=rows[:, 0], gyro=rows[:, 1:4], accel=rows[:, 4:]), start
-    edge = float(part.time[0]) - part.interval
-    holding = max(first - 1, 0) if edge > start.time else first  # the row that the epoch lies in
-    row = np.concatenate([[edge], record.gyro[holding], record.accel[holding]])
-    return part, carried_to(start, row, part.interval, increments=record.kind == "increments")
+    interval = part.interval  # not the whole log's: live, where few rows before the epoch are kept, it is the same
+    lost = lost_after(start, float(part.time[0]), interval) if first in record.gaps else 0
+    edge = float(part.time[0]) - interval - lost * interval
+    holding = max(first - 1, 0) if lost or edge > start.time else first  # the row that the epoch lies in
+    values = np.concatenate([record.gyro[holding], record.accel[holding]])
+    begun = carried_to(start, np.append(edge, values), interval, increments=record.kind == "increments")
+    if not lost:
+        return part, begun
+    rows = np.column_stack([part.time, part.gyro, part.accel])
+    rows = np.vstack([row_before_gap(float(part.time[0]), lost, interval, values), rows])
+    return replace(part, time=rows[:, 0], gyro=rows[:, 1:4], accel=rows[:, 4:]), begun
 
 
-def row_before_gap(start: Start, interval: float, held: Array) -> Array:
-    """(7,) the row that begins at a start's epoch: gyros and accelerometers (6,) as in the row before that."""
-    return np.concatenate([[start.time + interval], held])
+def lost_after(start: Start, first: float, interval: float) -> int:
+    """How many whole rows are lost between a start's epoch, give or take half of one, and the first row that came."""
+    missing = (first - start.time) / interval - GAP_FACTOR
+    return max(0, math.ceil(missing - EVEN))
+
+
+def row_before_gap(first: float, lost: int, interval: float, held: Array) -> Array:
+    """(7,) the first of the rows that are lost before the first one that came, with gyros and accelerometers (6,)."""
+    return np.append(first - lost * interval, held)
 
 
 def carried_to(start: Start, row: Array, interval: float, *, increments: bool) -> Start:
