@@ -1,9 +1,10 @@
 """Whether something bends between a slave and its master, where nobody said so.
 
 What the slave turns about an axis by its gyros, `X`, and by how much less the master's attitude turns, `D`, are compared row by
-row. Of one rigid body `D` is noise, and what a delay leaves: a quarter of a period off, which makes no share of `X`. Of a seat
-that bends it is what the seat turns. In each octave of frequencies below half the rate of the rows (what is faster is in the rows,
-too, folded into these),
+row. Of one rigid body `D` is noise, and what a delay tau leaves, ``(1 - exp(i w tau)) X``: attitudes that are not matched may have
+another one than velocities that a filter has made late. So the slave is taken where its turns are nearest to the master's. Of a
+seat that bends `D` is what the seat turns. In each octave of frequencies below half the rate of the rows (what is faster is in the
+rows, too, folded into these),
 
     share = Re sum(D X*) / sum |X|^2
 
@@ -39,6 +40,7 @@ SHARE = 0.2  # of what a slave turns within an octave: less may be a late master
 NOISE = 10.0  # times the variance of the gyros' own random walk of angle in an octave, folded noise included
 PHASE = 0.2  # rad, of a sigma of the delay: of what is faster nobody knows how much the master should show
 SURELY = 6.0  # standard errors; of three axes and six octaves chance has one beyond in 10^7 logs
+LATEST, STEP = 0.3, 0.01  # s: attitudes that are further off are no matter of a filter; the delay is between steps
 MISSES = 2.0  # sigmas: a delay, an arm or a mounting that is further off is none
 
 
@@ -83,15 +85,16 @@ def seen_to_bend(
     raw = relative(slave, carried, C_rigid, held)
     if raw is None:
         return None
-    knots, angles = raw
+    whole = own_angles(slave)
+    then = held + late(held, C_rigid, *raw, whole)
+    knots, angles = relative(slave, carried, C_rigid, then) or raw
     w = 2.0 * math.pi * frequencies(len(knots), slave.interval)
     tau = track.layout.slice_of(DELAY)
     unsure = 0.0 if tau is None else float(track.sigma[-1, tau][0])
-    whole = own_angles(slave)
     turned = filtered(whole, np.repeat((w * unsure < PHASE)[:, None], 3, axis=1))
     D, X = (
         np.fft.rfft(np.concatenate([rows, rows[::-1]]), axis=0)
-        for rows in (np.stack([np.interp(held, knots, axis) for axis in of.T], axis=1) for of in (angles, turned))
+        for rows in (at(then, knots, of) for of in (angles, turned))
     )
     f = frequencies(len(held), float(np.median(np.diff(held))))
     edge, bent = f[-1], np.zeros(3)
@@ -113,6 +116,27 @@ def seen_to_bend(
     rate = 2.0 * math.pi * np.fft.rfftfreq(len(fast), slave.interval)
     beta = float(rate @ spectrum / np.sum(spectrum))
     return FlexureSpec(sigma=(float(np.sqrt(bent.max())),) * 3, correlation_time=DECAY / beta)
+
+
+def at(times: Array, knots: Array, angles: Array) -> Array:
+    """(M, 3) angles at some times, between knots."""
+    return np.stack([np.interp(times, knots, axis) for axis in angles.T], axis=1)
+
+
+def late(held: Array, C_rigid: Array, knots: Array, angles: Array, turned: Array) -> float:
+    """By how much later a slave's turns (N + 1, 3) at `knots` are nearest to its master's, which they differ from by `angles`, s.
+
+    From row to row: what a seat bends adds as much to the squares whatever the delay.
+    """
+    held = held[np.isfinite(C_rigid).all(axis=(1, 2))]
+    body = at(held, knots, turned - angles)
+    taus = np.arange(-LATEST, LATEST + 0.5 * STEP, STEP)
+    cost = np.array([np.sum(np.diff(at(held + tau, knots, turned) - body, axis=0) ** 2) for tau in taus])
+    best = int(np.argmin(cost))
+    if best in (0, len(taus) - 1):
+        return float(taus[best])
+    before, here, after = cost[best - 1 : best + 2]
+    return float(taus[best] + 0.5 * STEP * (before - after) / (before - 2.0 * here + after))
 
 
 def shown(D: Array, X: Array) -> float:
