@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.honesty.frame import Outcome
+from benchmarks.honesty.harness import of_transfer
 from truenorth.aiding.matching import What
 from truenorth.alignment.transfer import align_transfer
-from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.records.flexure import DECAY, FlexureSpec
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
@@ -87,16 +87,6 @@ def bending(
         flexure = FlexureSpec(sigma=(size * DEG,) * 3, correlation_time=lasts) if said else None
         known: dict[str, Any] = {"lever_arm": given, "lever_arm_sigma": ARM_SIGMA, "flexure": flexure}
         answer = align_transfer(slave, master, imu, matching=matching, **known)
-        t = answer.transfer
-        assert t is not None
-        phi = -rotation_vector_from_dcm(answer.C_nb @ bent.states(np.array(answer.time)).C_nb.T)
-        ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
-        ratios = {
-            "heading": ratio[2:],
-            "level": ratio[:2],
-            "delay": np.array([(t.delay - tau) / t.delay_sigma if t.delay_estimated else np.nan]),
-            "arm": np.where(t.lever_arm_estimated, (t.lever_arm - arm) / t.lever_arm_sigma, np.nan),
-        }
-        return Outcome(ratios, "" if answer.status == "aligned" else f"{answer.status}: {answer.reasons[0]}")
+        return of_transfer(answer, bent.states(np.array(answer.time)).C_nb, tau, arm)
 
     return run

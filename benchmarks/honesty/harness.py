@@ -106,6 +106,21 @@ def outcome(case: Case, seed: int, run: int) -> Outcome:
     return Outcome(ratios, refused, f"{answer.status} {answer.method} {np.degrees(phi) * 60} arcmin")
 
 
+def of_transfer(answer: Alignment, C_nb: Array, delay: float, arm: Array) -> Outcome:
+    """Heading, level, delay and arm of a transfer over their sigmas; what is printed as not estimated claims nothing."""
+    t = answer.transfer
+    assert t is not None
+    phi = -rotation_vector_from_dcm(answer.C_nb @ C_nb.T)
+    ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
+    ratios = {
+        "heading": ratio[2:],
+        "level": ratio[:2],
+        "delay": np.array([(t.delay - delay) / t.delay_sigma if t.delay_estimated else np.nan]),
+        "arm": np.where(t.lever_arm_estimated, (t.lever_arm - arm) / t.lever_arm_sigma, np.nan),
+    }
+    return Outcome(ratios, "" if answer.status == "aligned" else f"{answer.status}: {answer.reasons[0]}")
+
+
 def framed(procedure: str, cases: Sequence[Case]) -> tuple[frame.Case, ...]:
     """These cases as rows of the matrix."""
     return tuple(

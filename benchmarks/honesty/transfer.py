@@ -21,11 +21,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.honesty.bending import bending
 from benchmarks.honesty.frame import Case, Outcome, main
+from benchmarks.honesty.harness import of_transfer
 from truenorth.aiding.aids import VEHICLE_ARM
 from truenorth.aiding.matching import What
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_start import DELAY_WALK
-from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.errors.master import MasterErrors
 from truenorth.records import MasterRecord
@@ -190,17 +190,7 @@ def transferred(
             master, late = wandering(master, rng)
         tau += late
         answer = align_transfer(slave, master, spec, matching=matching, master_errors=errors, **known)
-        t = answer.transfer
-        phi = -rotation_vector_from_dcm(answer.C_nb @ way.states(np.array(answer.time)).C_nb.T)
-        ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
-        ratios = {
-            "heading": ratio[2:],
-            "level": ratio[:2],
-            # What is printed as not estimated claims nothing.
-            "delay": np.array([(t.delay - tau) / t.delay_sigma if t.delay_estimated else np.nan]),
-            "arm": np.where(t.lever_arm_estimated, (t.lever_arm - arm) / t.lever_arm_sigma, np.nan),
-        }
-        return Outcome(ratios, "" if answer.status == "aligned" else f"{answer.status}: {answer.reasons[0]}")
+        return of_transfer(answer, way.states(np.array(answer.time)).C_nb, tau, arm)
 
     return run
 
