@@ -5,7 +5,8 @@ every row takes what is left of a wave for a scale or a mounting: of waves of ha
 of the speed, and a Doppler log whose own filter lasts two seconds had a scale of -6 %, place was 12 sigmas off. So the difference
 goes in as means by Hann's window, twice `SPAN` long, one for each `SPAN`, and what the log's errors show of it by the means of
 attitude and velocity over the same rows. While the ship changes its speed a filtered log shows it late, by ``a tau``: means in
-which that would be seen are left out; the scale shows before and after. Neighbouring means of white noise correlate by 1/6: of
+which that would be seen are left out; the scale shows before and after. So are those of turns, in which a log sits a metre from
+where it is taken to be: an arm that nobody has said is found by turns, and a log's filter leaves it short by a tenth. Neighbouring means of white noise correlate by 1/6: of
 what is slow they know no more than means with 4/3 of their variance that do not.
 
 Source: F. Harris, "On the use of windows for harmonic analysis with the discrete Fourier transform", Proc. IEEE 66 (1978), for
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 SPAN = 20.0  # s, from one mean to the next: longer than waves, shorter than turns
 ROUGH = 4.667  # variance of second differences of such means of white noise, theirs being 1
 LATE = 1.0  # s, by which a log may follow changes of speed later than is known
+ASTRAY = 1.0  # m, from where a log is taken to be
 FEWEST = 30  # of these differences, by which noise is known to a tenth
 OVERLAP = 4.0 / 3.0  # 1 + 2/6: density at zero frequency of such means
 
@@ -61,7 +63,8 @@ def over_waves(course: Track, velocity: Array, noise: float, start: int) -> Calm
     if not len(there):
         return Calm(velocity, course, noise)
     along = np.gradient(np.einsum("kji,kj->ki", course.C_nb, course.v_n)[:, :2], course.interval, axis=0)
-    parts = (course.v_n[:, :2] - velocity, course.C_nb.reshape(-1, 9), course.v_n, along)
+    turning = np.gradient(np.unwrap(np.arctan2(course.C_nb[:, 1, 0], course.C_nb[:, 0, 0])), course.interval)[:, None]
+    parts = (course.v_n[:, :2] - velocity, course.C_nb.reshape(-1, 9), course.v_n, along, turning)
     rows = np.concatenate([part[there] for part in parts], axis=1)
     found, weights = hann_means(course.time[there], rows, float(course.time[start]), n * course.interval)
     at = start + n * np.arange(len(found))
@@ -72,15 +75,20 @@ def over_waves(course: Track, velocity: Array, noise: float, start: int) -> Calm
     rough = rough[np.isfinite(rough)]
     if len(rough) >= 2 * FEWEST:
         size = max(float(1.4826 * np.median(np.abs(rough)) / np.sqrt(ROUGH)), LEAST_NOISE)
-    push = np.linalg.norm(found[:, 14:], axis=1)  # along the hull: in a turn it has none
-    least = float(np.nanmedian(push)) if np.isfinite(push).any() else 0.0  # a ship that always does has no others
+    late = LATE * np.linalg.norm(found[:, 14:16], axis=1)  # along the hull: in a turn it has none
+    astray = ASTRAY * np.abs(found[:, 16])
     with np.errstate(invalid="ignore"):
-        taken = LATE * push <= max(size, LATE * least)
+        taken = np.all([seen <= max(size, _usual(seen)) for seen in (late, astray)], axis=0)
     at, found = at[taken], found[taken]
     calm, C_nb, v_n = np.full_like(velocity, np.nan), course.C_nb.copy(), course.v_n.copy()
     calm[at] = course.v_n[at, :2] - found[:, :2]
     C_nb[at], v_n[at] = found[:, 2:11].reshape(-1, 3, 3), found[:, 11:14]
     return Calm(calm, replace(course, C_nb=C_nb, v_n=v_n), float(np.sqrt(OVERLAP)) * size)
+
+
+def _usual(seen: Array) -> float:
+    """What half of the means have: a ship that always does so has no others."""
+    return float(np.nanmedian(seen)) if np.isfinite(seen).any() else 0.0
 
 
 def hann_means(time: Array, rows: Array, first: float, span: float) -> tuple[Array, Array]:
