@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.honesty.voyage import SIGMA, passage
+from truenorth.core.attitude import dcm_from_euler
 from truenorth.damping.filters import Filter, run_filters
 from truenorth.damping.waves import SPAN, over_waves
 from truenorth.errors.log import LOGS, SCALE
@@ -98,4 +99,19 @@ def test_changes_of_speed_are_left_out():
     rows = np.flatnonzero(np.isfinite(over_waves(course, late + noise, 0.02, 0).velocity[:, 0]))
     changing = (time[rows] > 1000.0 - SPAN / 2) & (time[rows] < 1120.0 + SPAN / 2)
     assert not changing.any()
+    assert len(rows) > 0.9 * len(time) * T / SPAN - 8
+
+
+def test_turns_are_left_out():
+    """A log two metres from where it is taken to be, while the ship turns by half a degree a second for two minutes."""
+    calm, _ = at_sea(swing=0.0)
+    time = calm.time
+    heading = np.radians(np.clip(0.5 * (time - 1000.0), 0.0, 60.0))
+    C_nb = dcm_from_euler(heading, np.zeros_like(time), np.zeros_like(time)) @ calm.C_nb[0]
+    course = replace(calm, C_nb=C_nb, v_n=C_nb @ np.array([0.0, 6.0, 0.0]))
+    moved = np.gradient(C_nb @ np.array([0.0, 2.0, 0.0]), T, axis=0)[:, :2]
+    noise = 0.02 * np.random.default_rng(2).standard_normal(moved.shape)
+    rows = np.flatnonzero(np.isfinite(over_waves(course, course.v_n[:, :2] + moved + noise, 0.02, 0).velocity[:, 0]))
+    turning = (time[rows] > 1000.0 - SPAN / 2) & (time[rows] < 1120.0 + SPAN / 2)
+    assert not turning.any()
     assert len(rows) > 0.9 * len(time) * T / SPAN - 8

@@ -1,13 +1,13 @@
 """What INS and log differ by, averaged over waves, for a filter that estimates the log's errors.
 
-A log does not follow waves as an INS does: it is filtered, it samples them, its water moves with them. A filter that is given
-every row takes what is left of a wave for a scale or a mounting: of waves of half a metre a second it sees them far better than
-of the speed, and a Doppler log whose own filter lasts two seconds had a scale of -6 %, place was 12 sigmas off. So the difference
-goes in as means by Hann's window, twice `SPAN` long, one for each `SPAN`, and what the log's errors show of it by the means of
-attitude and velocity over the same rows. While the ship changes its speed a filtered log shows it late, by ``a tau``: means in
-which that would be seen are left out; the scale shows before and after. So are those of turns, in which a log sits a metre from
-where it is taken to be: an arm that nobody has said is found by turns, and a log's filter leaves it short by a tenth. Neighbouring means of white noise correlate by 1/6: of
-what is slow they know no more than means with 4/3 of their variance that do not.
+A log does not follow waves as an INS does: it is filtered, it samples them, its water moves with them. A filter that is given every
+row takes what is left of a wave for a scale or a mounting: of waves of half a metre a second it sees them far better than of the
+speed, and a Doppler log whose own filter lasts two seconds had a scale of -6 %, place was 12 sigmas off. So the difference goes in
+as means by Hann's window, twice `SPAN` long, one for each `SPAN`, and what the log's errors show of it by the means of attitude and
+velocity over the same rows. While the ship changes its speed a filtered log shows it late, by ``a tau``: means in which that would
+be seen are left out; the scale shows before and after. So are those of turns, in which a log sits a metre from where it is taken to
+be: an arm that nobody has said is found by turns, and a log's filter leaves it short by a tenth. Neighbouring means of white noise
+correlate by 1/6: of what is slow they know no more than means with 4/3 of their variance that do not.
 
 Source: F. Harris, "On the use of windows for harmonic analysis with the discrete Fourier transform", Proc. IEEE 66 (1978), for
 the window; the rest is ours.
